@@ -365,7 +365,7 @@ fn held_vertices_are_released_and_reported_as_run_does() {
     let done = work(&session, &mut worker);
     let run = drape::drape(&job.scene.load().unwrap().scene, &job.settings, &mut drape::unobserved).unwrap();
     let finished = &done.finished.as_ref().unwrap().drape;
-    assert!(run.let_go.is_some());
-    assert_eq!((finished.let_go, &finished.positions), (run.let_go, &run.positions));
+    assert!(run.release.is_some());
+    assert_eq!((finished.release, &finished.positions), (run.release, &run.positions));
     assert_eq!(finished.warnings, run.warnings);
 }

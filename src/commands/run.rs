@@ -306,7 +306,7 @@ impl RunArgs {
         if self.certify || self.strict {
             let began = Instant::now();
             let mut scene = loaded.scene.clone();
-            if matches!(drape.let_go, Some(Release::Stays { .. })) {
+            if matches!(drape.release, Some(Release::Stays { .. })) {
                 scene.held.clear();
             }
             summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);

@@ -53,7 +53,7 @@ pub(crate) struct Summary {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) since_last: Option<String>,
     /// The result of releasing held edges.
-    let_go: Option<String>,
+    release: Option<String>,
     /// The errors against the drape's own continuation, under `--accuracy`.
     accuracy: Option<Value>,
     /// Milliseconds of `load`, `sew`, `carry`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `certify`, `record`, `picture`, and `total`.
@@ -106,7 +106,7 @@ impl Summary {
             levels,
             ease,
             since_last: None,
-            let_go: drape.let_go.map(|let_go| let_go.to_string()),
+            release: drape.release.map(|release| release.to_string()),
             accuracy,
             timings_ms: BTreeMap::new(),
             warnings,
@@ -167,7 +167,7 @@ impl Summary {
         let moved = format!("{contact} PARTs touch the body, displacement {moved:.1} mm RMS");
         let two = format!("model {model}, motion {motion}, fabric {fabric}: {moved}");
         let stages = [("stage one", parts), ("stage two", two)].into_iter();
-        let released = self.let_go.iter().map(|released| ("released edges", released.clone()));
+        let released = self.release.iter().map(|released| ("released edges", released.clone()));
         let lines = stages.chain(released).chain(metrics.findings()).chain(self.since_last());
         let mut out = heading(&self.garment, &self.body, (metrics.vertices, metrics.triangles), lines);
         let _ = writeln!(out, "\n{}", self.levels_table());

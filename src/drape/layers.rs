@@ -90,7 +90,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
         stage: worn.joined(&parts),
         folds,
         state,
-        let_go: None,
+        release: None,
     };
     let mut drape = made.judged(scene, settings, times);
     drape.times.total = began.elapsed();

@@ -85,7 +85,7 @@ fn settle(
     let ground = Distances::of(scene)?;
     let distance = began.elapsed();
     // An edge that stayed up after its release in the first pose is not held again.
-    let released = matches!(before.let_go, Some(Release::Stays { .. }));
+    let released = matches!(before.release, Some(Release::Stays { .. }));
     let held: &[u32] = if released { &[] } else { &scene.held };
     let cloth = cloth_of(scene, settings, held)?;
     let carried = scene.garment.positions.clone();
@@ -109,7 +109,7 @@ fn settle(
         stage,
         folds: None,
         state: Some((positions, state)),
-        let_go: before.let_go,
+        release: before.release,
     };
     let refine = began.elapsed() - distance;
     let times = StageTimes { distance, refine, ..StageTimes::default() };

@@ -82,9 +82,9 @@ pub(super) fn drape_prepared(
     let table = settings.table.resolve(&ground.unsigned_m)?;
     let parts = timed(&mut times.segment, || stage_one(scene, settings.min_part, &table, &ground.unsigned_m));
     let level_part_count = parts.len();
-    let Moved { stage, folds, state, let_go } =
+    let Moved { stage, folds, state, release } =
         moved(scene, settings, ground, parts, cloth.as_ref(), &mut times, observer)?;
-    let made = StageResults { ground: ground.clone(), table, level_part_count, stage, folds, state, let_go };
+    let made = StageResults { ground: ground.clone(), table, level_part_count, stage, folds, state, release };
     let mut drape = made.judged(scene, settings, times);
     drape.times.total = times.total + began.elapsed();
     Ok(drape)
@@ -100,7 +100,7 @@ pub(super) struct Moved {
     pub(super) stage: StageTwo,
     pub(super) folds: Option<(Folds, Option<FoldableCloth>)>,
     pub(super) state: Option<(Vec<DVec3>, ClothState)>,
-    pub(super) let_go: Option<Release>,
+    pub(super) release: Option<Release>,
 }
 
 /// Stage two, and as many steps at full resolution as the settings ask for.
@@ -118,8 +118,8 @@ pub(super) fn moved(
         stage_two(scene, settings, ground, parts, cloth.map(|levels| &levels.cloth), &on)
     })?;
     let folds = folds_of(settings, cloth, &stage);
-    let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };
-    let ReleasedDrape { cloth, refined, let_go, .. } = timed(&mut times.refine, || {
+    let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, release: None }) };
+    let ReleasedDrape { cloth, refined, release, .. } = timed(&mut times.refine, || {
         let start = (approach(scene, settings, levels, &stage.positions, observer), StartsFrom::Parts);
         settle_and_release(scene, settings, levels, Some(ground), start, observer)
     })?;
@@ -128,7 +128,7 @@ pub(super) fn moved(
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
     }
-    Ok(Moved { stage, folds, state, let_go })
+    Ok(Moved { stage, folds, state, release })
 }
 
 pub(super) fn timed<T>(slot: &mut Duration, work: impl FnOnce() -> T) -> T {

@@ -12,6 +12,8 @@ pub enum Release {
     Slides {
         /// How far what was held had sunk when that was clear, m.
         sank_m: f64,
+        /// Whether a coarser mesh of the garment slid, so that it was not released at full resolution.
+        is_coarse: bool,
     },
 }
 
@@ -19,12 +21,13 @@ impl std::fmt::Display for Release {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Stays { sank_m } => {
-                write!(f, "stays up by itself: its waist sank {:.1} mm when let go", 1e3 * sank_m)
+                write!(f, "stays up by itself: released, its waist sank {:.1} mm", 1e3 * sank_m)
             }
-            Self::Slides { sank_m } => write!(
+            Self::Slides { sank_m, is_coarse } => write!(
                 f,
-                "does not stay up by itself: let go, its waist sank {:.1} mm and went on; it is shown held. A narrower waist or \
+                "does not stay up by itself: released{}, its waist sank {:.1} mm and went on; it is shown held. A narrower waist or \
                  a fabric of more friction would carry it",
+                if *is_coarse { " on a coarser mesh" } else { "" },
                 1e3 * sank_m
             ),
         }

@@ -39,7 +39,7 @@ pub(crate) struct ReleasedDrape {
     /// Positions with the edges held, m: a start for the same garment in another fabric or by another table.
     pub(crate) held_positions: Vec<DVec3>,
     /// Result of the release; `None` where nothing is released.
-    pub(crate) let_go: Option<Release>,
+    pub(crate) release: Option<Release>,
 }
 
 /// Steps at full resolution, with a release of the held edges where the scene asks for it. `ground` has the distances of the garment as placed.
@@ -59,8 +59,8 @@ pub(crate) fn settle_and_release(
     let held = refine_from(scene, settings, cloth, ground, start, until, observer)?;
     let held_positions = held.positions.clone();
     if !releases || held.stop != Stop::Converged {
-        let let_go = slid.map(|sank_m| Release::Slides { sank_m });
-        return Ok(ReleasedDrape { cloth: None, refined: held, held_positions, let_go });
+        let release = slid.map(|sank_m| Release::Slides { sank_m, is_coarse: true });
+        return Ok(ReleasedDrape { cloth: None, refined: held, held_positions, release });
     }
     let free = cloth_of(scene, settings, &[])?;
     let mut contacts = free.contacts(&scene.body, &held.positions);
@@ -81,19 +81,19 @@ pub(crate) fn settle_and_release(
     let sank_m = sank(&released.positions);
     if released.stop == Stop::Converged && sank_m <= MAX_SINK_M {
         let (cloth, refined) = (Some(free), after(held, released));
-        return Ok(ReleasedDrape { cloth, refined, held_positions, let_go: Some(Release::Stays { sank_m }) });
+        return Ok(ReleasedDrape { cloth, refined, held_positions, release: Some(Release::Stays { sank_m }) });
     }
-    let let_go = Some(Release::Slides { sank_m });
     if stopped {
         let refined = Refined { stop: Stop::Interrupted, ..held };
-        return Ok(ReleasedDrape { cloth: None, refined, held_positions, let_go });
+        return Ok(ReleasedDrape { cloth: None, refined, held_positions, release: None });
     }
     let start = (held_positions, StartsFrom::Rest);
     let rested = refine_from(scene, settings, cloth, ground, start, None, &mut |step| {
         observer(&Step { iteration: held.steps + step.iteration, ..*step })
     })?;
     let held_positions = rested.positions.clone();
-    Ok(ReleasedDrape { cloth: None, refined: after(held, rested), held_positions, let_go })
+    let release = Some(Release::Slides { sank_m, is_coarse: false });
+    Ok(ReleasedDrape { cloth: None, refined: after(held, rested), held_positions, release })
 }
 
 /// Options of the steps after a release.

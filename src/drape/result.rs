@@ -95,7 +95,7 @@ pub struct Drape {
     /// The cloth at full resolution; the equations of the paper alone need none.
     pub state: Option<ClothState>,
     /// Result of the release of edges that were held until the garment rested.
-    pub let_go: Option<Release>,
+    pub release: Option<Release>,
     /// Pairs of triangles of the displaced garment that cross: steps at full resolution keep cloth off cloth, PARTs alone do not.
     pub self_intersecting_pairs: usize,
     /// Vertices of the displaced garment inside the body.

@@ -90,13 +90,13 @@ pub(crate) struct StageResults {
     pub(crate) stage: StageTwo,
     pub(crate) folds: Option<(Folds, Option<FoldableCloth>)>,
     pub(crate) state: Option<(Vec<DVec3>, ClothState)>,
-    pub(crate) let_go: Option<Release>,
+    pub(crate) release: Option<Release>,
 }
 
 impl StageResults {
     /// The drape, with what must be looked for in it.
     pub(crate) fn judged(self, scene: &Scene, settings: &Settings, times: StageTimes) -> Drape {
-        let Self { ground, table, level_part_count, stage, folds, state, let_go } = self;
+        let Self { ground, table, level_part_count, stage, folds, state, release } = self;
         let mut warnings = unassigned_warning(&stage.parts);
         warnings.extend(stage.warnings);
         let (positions, state) = match state {
@@ -104,7 +104,7 @@ impl StageResults {
             Some((positions, state)) => (positions, Some(state)),
         };
         warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
-        if let Some(slides @ Release::Slides { .. }) = &let_go {
+        if let Some(slides @ Release::Slides { .. }) = &release {
             warnings.push(format!("the garment {slides}"));
         }
         warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)));
@@ -126,7 +126,7 @@ impl StageResults {
             folds,
             foldable,
             state,
-            let_go,
+            release,
             self_intersecting_pairs,
             positions,
             penetrating_vertices,

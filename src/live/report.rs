@@ -151,7 +151,7 @@ fn figures(found: &Finished) -> Value {
     all["state"] = json!(found.state);
     all["preview_error_mm"] = json!(found.preview_error_mm);
     all["bound_mm"] = json!(found.bound_mm);
-    all["let_go"] = json!(found.drape.let_go.map(|let_go| let_go.to_string()));
+    all["release"] = json!(found.drape.release.map(|release| release.to_string()));
     all["warnings"] = json!([found.loaded_scene.input.warnings(), found.drape.warnings.clone()].concat());
     all
 }

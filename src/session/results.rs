@@ -116,7 +116,7 @@ pub struct AtRest {
     pub ms: f64,
     pub after_ms: f64,
     /// Outcome of releasing the vertices that were held until the garment rested.
-    pub let_go: Option<Release>,
+    pub release: Option<Release>,
     /// Reaction of the body on each vertex, N.
     pub(crate) reaction_n: Arc<Vec<DVec3>>,
     pub(crate) cloth_state: Option<Arc<ClothState>>,

@@ -109,7 +109,7 @@ impl Refinement<'_> {
             after_ms: ms_since(task.target.accepted),
             reaction_n: Arc::default(),
             cloth_state: None,
-            let_go: None,
+            release: None,
             inputs: RestInputs::of(task.settings()),
             held_positions: Arc::default(),
         }

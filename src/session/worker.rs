@@ -239,7 +239,7 @@ impl Worker {
             task.check()
         };
         let drape = settle_and_release(scene, settings, levels, distances, (start, from), &mut observer)?;
-        let ReleasedDrape { cloth, refined, held_positions, let_go } = drape;
+        let ReleasedDrape { cloth, refined, held_positions, release } = drape;
         let (held_positions, generation) = (Arc::new(held_positions), task.loaded_scene().generation);
         self.rest = Some(WarmStart { generation, positions: Arc::clone(&held_positions) });
         // A drape that falls off the body is interrupted, too, and published.
@@ -250,7 +250,7 @@ impl Worker {
         let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
         let (positions, cloth_state) = settled(scene, settings, cloth, distances, refined);
         let rest = at_rest(&refinement, cloth, &positions, &cloth_state);
-        let rest = Arc::new(AtRest { let_go, held_positions, ms: 1e3 * took.as_secs_f64(), ..rest });
+        let rest = Arc::new(AtRest { release, held_positions, ms: 1e3 * took.as_secs_f64(), ..rest });
         self.progress.refined = Some(took);
         task.publish(|state| publish_rest(state, rest));
         Ok(())
@@ -317,7 +317,7 @@ impl Worker {
             folds: folds_of(task.settings(), levels, &stage),
             stage,
             state,
-            let_go: rest.and_then(|rest| rest.let_go),
+            release: rest.and_then(|rest| rest.release),
         };
         self.publish_finished(task, made.judged(task.scene(), task.settings(), times));
     }

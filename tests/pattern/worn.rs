@@ -115,7 +115,7 @@ fn a_waist_is_released_where_friction_holds_it_and_stays_held_where_it_slides() 
         let mut settings = Settings::default();
         settings.fabric.friction = friction;
         let drape = drape(scene, &settings, &mut unobserved).unwrap();
-        assert_eq!(matches!(drape.let_go, Some(Release::Stays { .. })), stays, "{friction}: {:?}", drape.let_go);
+        assert_eq!(matches!(drape.release, Some(Release::Stays { .. })), stays, "{friction}: {:?}", drape.release);
         let waist_moved = scene.held.iter().any(|&v| {
             let v = v as usize;
             drape.positions[v] != scene.garment.positions[v]
@@ -148,7 +148,7 @@ fn a_waist_that_slides_on_coarser_cloth_is_not_released_at_full_resolution() {
         })
         .unwrap();
         let stays = friction > 0.0;
-        assert_eq!(matches!(drape.let_go, Some(Release::Stays { .. })), stays, "{:?}", drape.let_go);
+        assert_eq!(matches!(drape.release, Some(Release::Stays { .. })), stays, "{:?}", drape.release);
         assert_eq!(released_steps > 0, stays || !has_coarser, "{has_coarser} {friction}: {released_steps}");
         assert_eq!(drape.state.unwrap().stop, Stop::Converged);
     }
