@@ -1,8 +1,8 @@
 //! Options of the solver: every tolerance, limit and switch of Newton's method at full resolution, with its default.
 //!
 //! One group for each mechanism, in the order in which a solve meets them. `partwise bench ablation` changes one option at a time
-//! (`docs/guide/solver.md`). Numbers of steps without a comparison are those of its 21 small drapes together, for 617 with the defaults;
-//! 522 to 667 are chance. Options are set by `--solver GROUP.KEY=VALUE`, in a job (`[settings.solver.GROUP]`) and in a sweep; they are for
+//! (`docs/guide/solver.md`). Numbers of steps without a comparison are those of its 21 small drapes together, for 545 with the defaults;
+//! a tenth more or less is chance. Options are set by `--solver GROUP.KEY=VALUE`, in a job (`[settings.solver.GROUP]`) and in a sweep; they are for
 //! experiments, and what was measured was measured with the defaults.
 //!
 //! Constants that describe the model (stiffness of contact, thickness, friction) or the machine (sizes of chunks) are not here.
@@ -44,11 +44,11 @@ options! {
 
     /// Softened continuation: stiff cloth far from rest is settled with a capped stiffness first.
     SofteningOptions {
-        /// Strain under its own hanging weight at which the stiffness is capped; 0 for the true stiffness throughout: 681 steps.
+        /// Strain under its own hanging weight at which the stiffness is capped; 0 for the true stiffness throughout: 604 steps.
         strain: f64 = 0.005,
         /// Residual, over ‖m g‖₂ (that of cloth in free fall), above which cloth is softened. A drape that was at rest before is well below.
         min_residual: f64 = 0.5,
-        /// Residual over weight at which the softened cloth gets its true stiffness. Halved, doubled: 616, 623 steps.
+        /// Residual over weight at which the softened cloth gets its true stiffness. Halved, doubled: 550, 563 steps.
         tolerance: f64 = 1e-2,
     }
 
@@ -64,7 +64,7 @@ options! {
         longest_move_m: f64 = 0.1,
         /// Damping ε to begin with, in g/L ([`refine`](super::refine)). Evidence: decision 33.
         damping: f64 = 8.0,
-        /// Least damping, and that to begin with from a drape that rested, in g/L. Halved, doubled: 539, 579 steps.
+        /// Least damping, and that to begin with from a drape that rested, in g/L. Halved, doubled: 538, 530 steps.
         min_damping: f64 = 0.1,
         /// Factor on the damping after a short step; after a whole one it is divided by it.
         damping_factor: f64 = 2.0,
@@ -74,13 +74,13 @@ options! {
         /// Largest extrapolation of a step: see `newton::extrapolation`. With 2 ten garments of 1,000 to 5,500 vertices take 93 steps in knit and
         /// 248 in cotton, with 1 95 and 279.
         max_extrapolation: f64 = 2.0,
-        /// Cosine with the previous step above which a step continues it. With 0.4, and without: 550, 575 steps.
+        /// Cosine with the previous step above which a step continues it. With 0.4, and without: 547, 591 steps.
         continues_cosine: f64 = 0.8,
     }
 
     /// Relaxation of steps by L-BFGS: see `newton::relax`.
     RelaxationOptions {
-        /// Iterations at the start and after a step. With 0: 728 steps, and skin through cloth in one drape.
+        /// Iterations at the start and after a step. With 0: 677 steps.
         iterations: usize = 20,
         /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation. Ten garments of 1,000 to
         /// 5,500 vertices take 109 steps in knit and 326 in cotton with 60, 94 and 229 with 120 (and fewer projected steps), in less time; with 160 some fewer, in
@@ -109,7 +109,7 @@ options! {
         /// Residual over weight above which steps do not count as a cycle; 0 turns the damping of cycles off. With 0 three of 192 coarse
         /// garments do not rest; with 0.1 one of a hundred perturbed starts stays in a cycle at 0.12.
         max_residual: f64 = 0.3,
-        /// Steps without progress that may count as a cycle. Halved or doubled: the same steps.
+        /// Steps without progress that may count as a cycle. Halved, doubled: 556, 545 steps.
         window: usize = 12,
         /// They do if the energy changed by less than this share of what it went up and down. Halved or doubled: the same steps.
         return_share: f64 = 0.3,
@@ -129,7 +129,7 @@ options! {
 
     /// Contact places within triangles: see `energy::face_contacts`.
     FaceContactOptions {
-        /// Residual over weight below which places are added before the cloth rests with the present ones. With 0: 708 steps.
+        /// Residual over weight below which places are added before the cloth rests with the present ones. With 0: 593 steps.
         max_residual: f64 = 3e-2,
         /// Steps after which the places are removed if the cloth does not rest with them. The most observed are 24, in a pair of trousers.
         max_steps: usize = 80,
@@ -149,9 +149,9 @@ options! {
     /// Contact of the cloth with itself: see `energy::proximity`.
     SelfContactOptions {
         /// Distance up to which gaps are searched, in offsets: large enough that a step closes no gap which the search missed. Halved,
-        /// doubled: 623, 613 steps.
+        /// doubled: 552, 526 steps.
         search_reach: f64 = 2.5,
-        /// Least offset in mean edges, so that contact is distinguished from intersection. Halved, doubled: 621, 667 steps.
+        /// Least offset in mean edges, so that contact is distinguished from intersection. Halved, doubled: 544, 550 steps.
         min_offset_of_edge: f64 = 0.1,
         /// Largest value of that least offset on a coarse mesh, m. Without it three of 48 garments of two layers (60 and 250
         /// vertices) do not rest.
@@ -162,7 +162,7 @@ options! {
         neighbour_share: f64 = 0.5,
         /// Share of its rest area that an edge contributes to a gap: a vertex has some three edges, each with several gaps.
         edge_area_share: f64 = 0.25,
-        /// A gap with less than this share of its offset left grows stiffer. Halved, doubled: 543, 537 steps.
+        /// A gap with less than this share of its offset left grows stiffer. Halved, doubled: 536, 588 steps.
         narrow_share: f64 = 0.25,
         /// Factor by which a narrow gap grows stiffer at a refresh. With 1, two of eight trousers of 250 vertices do not rest.
         stiffening: f64 = 2.0,
@@ -182,7 +182,7 @@ options! {
         /// Longest move of a step that is taken with parts held back even if its energy rises, in mean edges; a longer one must lower it. With 0
         /// garments rest as soon, but two sheets that start intersecting stall.
         max_cut_move: f64 = 1.0,
-        /// Times that intersecting corners go back half the way; after that they go all the way, with their neighbours. With 0: 728 steps,
+        /// Times that intersecting corners go back half the way; after that they go all the way, with their neighbours. With 0: 626 steps,
         /// and one drape does not rest.
         max_halvings: usize = 4,
         /// Rings of neighbours about intersecting triangles in which new intersections are allowed. With 0 a shirt sewn from its pattern
