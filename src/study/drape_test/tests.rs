@@ -52,15 +52,19 @@ fn a_wider_rim_drapes_more() {
     assert!(narrow > medium + 0.05 && medium > wide + 0.05, "{narrow}, {medium} and {wide}");
 }
 
+/// Means of three starts: those of one mesh differ by up to three nodes.
 #[test]
 fn the_mesh_does_not_choose_the_drape_of_an_isotropic_fabric() {
     let fabric = Fabric::by_name("cotton").unwrap();
-    let at = |degrees: f64| DrapeTest { turned: degrees.to_radians(), ..coarse(8) }.run(&fabric).unwrap();
+    let at = |degrees: f64| {
+        let drapes = Drapes::of(&fabric, DrapeTest { turned: degrees.to_radians(), ..coarse(8) }, 3).unwrap();
+        [drapes.mean(|drape| drape.coefficient), drapes.mean(|drape| drape.nodes.count as f64)]
+    };
     let plain = at(0.0);
     for degrees in [15.0, 40.0] {
         let turned = at(degrees);
-        assert!((turned.coefficient - plain.coefficient).abs() < 0.05, "{degrees}: {}", turned.coefficient);
-        assert!(turned.nodes.count.abs_diff(plain.nodes.count) <= 1, "{degrees}: {:?}", turned.nodes);
+        assert!((turned[0] - plain[0]).abs() < 0.03, "{degrees}: {turned:?} for {plain:?}");
+        assert!((turned[1] - plain[1]).abs() < 1.5, "{degrees}: {turned:?} for {plain:?}");
     }
 }
 
