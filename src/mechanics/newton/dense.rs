@@ -22,7 +22,8 @@ const TILE_REGISTERS: usize = 2;
 const TILE_COLUMNS: usize = 4;
 
 /// Factors a panel of `height` rows, its diagonal block on top, lower half. A pivot that is zero or negative, or rounding beside the entry of
-/// `diagonal` for its column, is replaced by that entry, as if nothing pulled there but the unknown itself.
+/// `diagonal` for its column, is replaced by that entry and the numbers below it by zero, as if the unknown pulled at nothing but itself: they are
+/// rounding, too, and after a few dozen such pivots no longer finite.
 ///
 /// # Errors
 /// The column whose pivot is not finite.
@@ -69,10 +70,13 @@ impl Work for Narrow<'_> {
             if !pivot.is_finite() {
                 return Some(j);
             }
-            let lost = pivot <= f32::EPSILON * own;
-            let root = if lost { own.max(f32::MIN_POSITIVE) } else { pivot }.sqrt();
-            let scale = root.recip();
-            column[0] = root;
+            if pivot <= f32::EPSILON * own {
+                column.fill(0.0);
+                column[0] = own.max(f32::MIN_POSITIVE).sqrt();
+                continue;
+            }
+            column[0] = pivot.sqrt();
+            let scale = column[0].recip();
             let factor = l.splat_single(scale);
             let mut registers = column[1..].chunks_exact_mut(WIDTH);
             for c in &mut registers {
@@ -401,6 +405,7 @@ mod tests {
             l[bad * 30 + bad] = -1.0;
             factor_panel(&mut l, 30, &[30.0; 25]).unwrap();
             assert_eq!(l[bad * 30 + bad], 30_f32.sqrt());
+            assert!(l[bad * 30 + bad + 1..(bad + 1) * 30].iter().all(|below| *below == 0.0));
         }
         let (mut l, _) = panel(30, 25);
         l[7 * 30 + 7] = f32::NAN;
