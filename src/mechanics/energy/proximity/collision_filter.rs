@@ -132,7 +132,7 @@ impl CollisionFilter {
             for cut in 0.. {
                 crossing = self.crossing_at(&at(&limits, share));
                 let new = self.new_crossings(&crossing);
-                if new.is_empty() {
+                if new.is_empty() || cut == self.options.max_cuts {
                     break;
                 }
                 let back = if cut < self.options.max_halvings { 0.5 } else { 0.0 };
