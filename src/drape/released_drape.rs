@@ -109,7 +109,7 @@ fn mean_sink(held: &[bool], before: &[DVec3], after: &[DVec3]) -> f64 {
 }
 
 /// How far the waist has sunk, m, if the garment's coarsest cloth slides when released from `start`, the positions of the full garment, m;
-/// `None` if it stays up or there is none. `observer` receives the steps as step 0.
+/// `None` if it stays up, or if the garment has no coarser cloth. `observer` receives the steps as step 0.
 fn slides_when_coarse(
     scene: &Scene,
     settings: &Settings,

@@ -2,7 +2,7 @@
 //!
 //! One group for each mechanism, in the order in which a solve meets them. `partwise bench ablation` changes one option at a time
 //! (`docs/guide/solver.md`). Numbers of steps without a comparison are those of its 21 small drapes together, for 545 with the defaults;
-//! a tenth more or less is chance. Options are set by `--solver GROUP.KEY=VALUE`, in a job (`[settings.solver.GROUP]`) and in a sweep; they are for
+//! an eighth more or less is chance. Options are set by `--solver GROUP.KEY=VALUE`, in a job (`[settings.solver.GROUP]`) and in a sweep; they are for
 //! experiments, and what was measured was measured with the defaults.
 //!
 //! Constants that describe the model (stiffness of contact, thickness, friction) or the machine (sizes of chunks) are not here.
@@ -185,8 +185,8 @@ options! {
         /// Times that intersecting corners go back half the way; after that they go all the way, with their neighbours. With 0: 626 steps,
         /// and one drape does not rest.
         max_halvings: usize = 4,
-        /// Most times that a step is cut. Each cut holds back one more ring of neighbours; without a limit a hundred perturbed starts were not
-        /// done after 26 minutes, for six. Halved or doubled: the same steps.
+        /// Most times that a step is cut. Each cut holds back one more ring of neighbours; without a limit a hundred perturbed starts were
+        /// not done after 26 minutes beside other jobs, for three on an idle machine. Halved or doubled: the same steps.
         max_cuts: usize = 16,
         /// Rings of neighbours about intersecting triangles in which new intersections are allowed. With 0 a shirt sewn from its pattern
         /// stops after 654 steps with 44 crossing pairs (14 steps with 2).

@@ -23,7 +23,7 @@ const TILE_COLUMNS: usize = 4;
 
 /// Factors a panel of `height` rows, its diagonal block on top, lower half. A pivot that is zero or negative, or rounding beside the entry of
 /// `diagonal` for its column, is replaced by that entry and the numbers below it by zero, as if the unknown pulled at nothing but itself: they are
-/// rounding, too, and after a few dozen such pivots no longer finite.
+/// rounding, too, and where many pivots are lost the factor may become infinite by them.
 ///
 /// # Errors
 /// The column whose pivot is not finite.
