@@ -1,7 +1,6 @@
 //! Curvature of the energy about a state of equilibrium: its softest directions, and the directions in which it decreases.
 //!
-//! H is the true Hessian of gravity, membrane and bending, from differences of the gradient, plus the stiffness of contact and friction
-//! as it is in that state. B is a positive definite matrix near H that has been factorised: the projected Hessian of Newton's method.
+//! H is the true Hessian of membrane and bending, plus the stiffness of contact and friction as it is in that state. B is a positive definite matrix near H that has been factorised: the projected Hessian of Newton's method.
 //! With B = L Lᵀ, Lanczos' method on L⁻¹ H L⁻ᵀ finds the smallest λ with H z = λ B z, z = L⁻ᵀ y. Most of the spectrum lies near one, so
 //! soft and negative directions are separated from it and converge first. By Sylvester's law of inertia the number of negative λ equals the
 //! number of independent directions in which the energy decreases, for any B; a factor in single precision therefore suffices. (On B⁻¹H in the
@@ -19,9 +18,9 @@
 //! contacts are constant, so a direction that lifts cloth off the body is not found; λ is an upper bound, and the method ends once the smallest is
 //! known, so that of several negative ones some may be missed.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-use super::energy::{Cloth, ContactBlock, Contacts, HessianLayout, Scratch};
+use super::energy::sparsity::Pattern;
 use super::linear_algebra::{Basis, dot_flat, symmetric_eigen};
 use super::newton::Solver;
 
@@ -39,9 +38,6 @@ const CHECK_INTERVAL: usize = 4;
 /// Damping ε in B for that decision, 1/s²: under a thousandth of the squared frequency of hanging cloth (g over a metre).
 pub(crate) const LANCZOS_DAMPING: f64 = 1e-2;
 
-/// Longest move of a vertex in a difference of the gradient, m. The energy is nonlinear over the length of an edge, a centimetre.
-const DIFFERENCE_STEP_M: f64 = 1e-6;
-
 /// λ below this is negative; above, it may be rounding.
 pub(crate) const NEGATIVE_CURVATURE: f64 = -1e-6;
 
@@ -51,11 +47,9 @@ const EXHAUSTED: f64 = 1e-6;
 
 /// H over the free vertices in elimination order.
 pub(crate) struct HessianOperator<'a> {
-    pub(crate) cloth: &'a Cloth,
-    pub(crate) layout: &'a HessianLayout,
-    /// Positions, m.
-    pub(crate) x: &'a [DVec3],
-    pub(crate) contacts: Vec<ContactBlock>,
+    pub(crate) pattern: &'a Pattern,
+    /// N/m.
+    pub(crate) blocks: &'a [DMat3],
 }
 
 /// Ritz values and vectors of the smallest λ.
@@ -67,46 +61,17 @@ pub(crate) struct Ritz {
 }
 
 impl HessianOperator<'_> {
-    /// Values of the unknowns from those of all vertices.
-    pub(crate) fn gather(&self, all: &[DVec3]) -> Vec<DVec3> {
-        self.layout.order.iter().map(|&v| all[v as usize]).collect()
-    }
-
-    /// Values of all vertices from those of the unknowns; zero where held.
-    pub(crate) fn scatter(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
-        let mut all = vec![DVec3::ZERO; self.x.len()];
-        for (&v, z) in self.layout.order.iter().zip(unknowns) {
-            all[v as usize] = *z;
-        }
-        all
-    }
-
     /// H z.
-    pub(crate) fn apply(&self, z: &[DVec3], scratch: &mut Scratch) -> Vec<DVec3> {
-        let longest = z.iter().map(|z| z.length()).fold(0.0, f64::max);
-        let h = DIFFERENCE_STEP_M / longest.max(f64::MIN_POSITIVE);
-        let whole = self.scatter(z);
-        let mut gradient_at = |h: f64| {
-            let there: Vec<DVec3> = self.x.iter().zip(&whole).map(|(x, z)| *x + *z * h).collect();
-            let mut gradient = Vec::new();
-            self.cloth.evaluate(&there, &Contacts::none(), &mut gradient, scratch);
-            gradient
-        };
-        let (ahead, behind) = (self.gather(&gradient_at(h)), self.gather(&gradient_at(-h)));
-        let differences = ahead.iter().zip(&behind).map(|(a, b)| (*a - *b) / (2.0 * h));
-        let mut product: Vec<DVec3> = differences.collect();
-        for ContactBlock { members, block } in &self.contacts {
-            let across: DVec3 = members.iter().map(|&(i, w)| z[i as usize] * w).sum();
-            members.iter().for_each(|&(i, w)| product[i as usize] += *block * across * w);
-        }
+    pub(crate) fn apply(&self, z: &[DVec3]) -> Vec<DVec3> {
+        let mut product = Vec::new();
+        self.pattern.multiply(self.blocks, z, &mut product);
         product
     }
 
-    /// Lanczos' method with the factor in `solver`; a step costs a solve and two gradients.
+    /// Lanczos' method with the factor in `solver`; a step costs a solve and a product.
     pub(crate) fn lanczos(&self, max_steps: usize, solver: &mut Solver) -> Ritz {
-        let n = self.layout.order.len();
+        let n = self.pattern.starts.len() - 1;
         let mut basis = Basis::default();
-        let mut scratch = Scratch::default();
         let size = max_steps.min(3 * n);
         // Row by row.
         let mut matrix = vec![0.0; size * size];
@@ -139,9 +104,9 @@ impl HessianOperator<'_> {
                 }
             }
             y.iter_mut().for_each(|y| *y /= norm);
-            let product = self.apply(&solver.upper(&y), &mut scratch);
+            let product = self.apply(&solver.upper(&y));
             basis.push(std::mem::replace(&mut y, solver.lower(&product)));
-            // The whole row instead of its two entries: H comes from differences and is only nearly symmetric.
+            // The whole row instead of its two entries: the factor is in single precision.
             for (j, value) in basis.transposed_times(0, &y).into_iter().enumerate() {
                 matrix[steps * size + j] = value;
                 matrix[j * size + steps] = value;

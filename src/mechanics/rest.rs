@@ -31,7 +31,7 @@ use glam::{DMat3, DVec3};
 use super::curvature::{HessianOperator, LANCZOS_DAMPING, MAX_LANCZOS_STEPS, NEGATIVE_CURVATURE};
 use super::energy::friction::ELASTIC_SLIP;
 use super::energy::membrane::outer;
-use super::energy::{Cloth, ContactBlock, Contacts, HessianKind, HessianLayout, Scratch};
+use super::energy::{Cloth, Contacts, HessianKind, HessianLayout};
 use super::linear_algebra::dot;
 use super::newton::{FullSpace, SolveError, Solver};
 use super::reactions::{Forces, MAX_RESIDUAL, Reaction};
@@ -118,12 +118,20 @@ pub(crate) fn coupled_by(forces: &Forces) -> impl Iterator<Item = [u32; 2]> {
     pushing(forces).flat_map(|t| t.shares.iter().flat_map(|(a, _)| t.shares.iter().map(|(b, _)| [*a, *b])))
 }
 
+/// A contact's part of the Hessian: unknowns with their shares, and the matrix between them.
+struct ContactBlock {
+    members: Vec<(u32, f64)>,
+    /// N/m.
+    block: DMat3,
+}
+
 /// The energy to second order about a state of a cloth, with the reactions of its contacts.
 pub(crate) struct Linearised<'a> {
     cloth: &'a Cloth,
     x: &'a [DVec3],
     layout: &'a HessianLayout,
     contacts: Vec<ContactBlock>,
+    blocks: &'a mut Vec<DMat3>,
     solver: &'a mut Solver,
     /// The next Newton step of every vertex, m; zero where held.
     pub(crate) step: Vec<DVec3>,
@@ -171,18 +179,19 @@ impl<'a> Linearised<'a> {
         let mut unknowns: Vec<DVec3> = layout.order.iter().map(|&v| -forces.residual_forces[v as usize]).collect();
         solver.factorise(blocks, &damped)?;
         solver.solve(&layout.pattern, blocks, &damped, STEP_TOLERANCE, &mut unknowns);
-        let mut step = vec![DVec3::ZERO; x.len()];
-        layout.order.iter().zip(&unknowns).for_each(|(&v, d)| step[v as usize] = *d);
-        Ok(Self { cloth, x, layout, contacts, solver, step })
+        let step = layout.scatter(&unknowns, x.len());
+        Ok(Self { cloth, x, layout, contacts, blocks, solver, step })
     }
 
     /// The softest modes.
     pub(crate) fn curvature(self) -> Curvature {
-        let Self { cloth, x, layout, contacts, solver, step } = self;
-        let hessian = HessianOperator { cloth, layout, x, contacts };
+        let Self { cloth, x, layout, contacts, blocks, solver, step } = self;
+        cloth.hessian_in(layout, HessianKind::True, x, &Contacts::none(), blocks);
+        contacts.iter().for_each(|c| layout.add(&c.members, c.block, blocks));
+        let hessian = HessianOperator { pattern: &layout.pattern, blocks };
         let ritz = hessian.lanczos(MAX_LANCZOS_STEPS, solver);
         let softest = &ritz.vectors[0];
-        let turned = hessian.apply(softest, &mut Scratch::default());
+        let turned = hessian.apply(softest);
         let mass: f64 =
             softest.iter().zip(&layout.order).map(|(z, &v)| cloth.masses[v as usize] * z.length_squared()).sum();
         let farthest =
@@ -191,7 +200,7 @@ impl<'a> Linearised<'a> {
             lowest: dot(softest, &turned) / mass,
             unstable_modes: ritz.values.iter().filter(|&&l| l < NEGATIVE_CURVATURE).count(),
             at: layout.order.get(farthest).map_or(0, |&v| v as usize),
-            modes: ritz.vectors.iter().map(|z| hessian.scatter(z)).collect(),
+            modes: ritz.vectors.iter().map(|z| layout.scatter(z, x.len())).collect(),
             step,
         }
     }

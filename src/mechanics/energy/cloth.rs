@@ -59,13 +59,6 @@ pub struct Scratch {
     halves: [Vec<Four>; 2],
 }
 
-/// A contact's part of the Hessian: unknowns with their shares, and the matrix between them.
-pub(crate) struct ContactBlock {
-    pub(crate) members: Vec<(u32, f64)>,
-    /// N/m.
-    pub(crate) block: DMat3,
-}
-
 /// The constant data of the energy of one garment in its fabrics.
 #[derive(Debug, Clone)]
 pub struct Cloth {

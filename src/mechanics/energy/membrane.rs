@@ -138,7 +138,9 @@ const BUCKLING_SHARE: f64 = 0.1;
 pub(crate) enum HessianKind {
     /// Without negative curvature: positive semi-definite.
     Projected,
-    /// Exact up to buckling; possibly indefinite.
+    /// Exact up to the buckling stress of a triangle; possibly indefinite.
+    UpToBuckling,
+    /// Exact.
     True,
 }
 
@@ -243,17 +245,22 @@ impl Triangle {
         let (tu, tv, tau) = (k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * fu.dot(fv));
         let n = fu.cross(fv).normalize_or_zero();
         let (wu, wv) = (n.cross(u), n.cross(v));
-        // Least stress out of the plane and within it, and the shear stress that turns within the plane.
-        let (least, sideways, in_plane) = match kind {
-            HessianKind::True => (-c.buckling / self.area, f64::NEG_INFINITY, tau),
-            HessianKind::Projected => (0.0, 0.0, 0.0),
+        let stress = [tu / lu, tv / lv, tau];
+        let no_less_than = |least: f64| {
+            let (a, b, t) = positive_part(stress[0] - least, stress[1] - least, tau);
+            [a + least, b + least, t]
         };
-        let (a, b, t) = positive_part(tu / lu - least, tv / lv - least, tau);
+        // Stresses u, v and shear that act out of the plane and within it.
+        let (out_of_plane, in_plane) = match kind {
+            HessianKind::True => (stress, stress),
+            HessianKind::UpToBuckling => (no_less_than(-c.buckling / self.area), stress),
+            HessianKind::Projected => (no_less_than(0.0), [stress[0].max(0.0), stress[1].max(0.0), 0.0]),
+        };
         let nn = outer(n, n);
-        let (su, sv) = ((tu / lu).max(sideways), (tv / lv).max(sideways));
-        let huu = outer(u, u) * k.uu + outer(fv, fv) * c.shear + outer(wu, wu) * su + nn * (a + least);
-        let hvv = outer(v, v) * k.vv + outer(fu, fu) * c.shear + outer(wv, wv) * sv + nn * (b + least);
-        let huv = outer(u, v) * k.uv + outer(fv, fu) * c.shear + (DMat3::IDENTITY - nn) * in_plane + nn * t;
+        let [a, b, t] = out_of_plane;
+        let huu = outer(u, u) * k.uu + outer(fv, fv) * c.shear + outer(wu, wu) * in_plane[0] + nn * a;
+        let hvv = outer(v, v) * k.vv + outer(fu, fu) * c.shear + outer(wv, wv) * in_plane[1] + nn * b;
+        let huv = outer(u, v) * k.uv + outer(fv, fu) * c.shear + (DMat3::IDENTITY - nn) * in_plane[2] + nn * t;
         [huu, huv, hvv]
     }
 

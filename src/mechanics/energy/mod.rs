@@ -32,7 +32,7 @@ pub mod sparsity;
 mod vertex_ring;
 
 pub use cloth::{Cloth, Scratch};
-pub(crate) use cloth::{ContactBlock, MIN_BODY_RADIUS_M};
+pub(crate) use cloth::MIN_BODY_RADIUS_M;
 pub use contact::Contacts;
 pub(crate) use contact::{FaceUpdate, TOUCH_MARGIN_M};
 pub use error::EnergyError;

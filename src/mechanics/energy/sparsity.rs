@@ -154,6 +154,13 @@ impl HessianLayout {
         members.map(|(v, w)| (self.unknown[v as usize], w)).filter(|(i, _)| *i != HELD).collect()
     }
 
+    /// Values of all `vertices` from those of the unknowns; zero where held.
+    pub(crate) fn scatter(&self, unknowns: &[DVec3], vertices: usize) -> Vec<DVec3> {
+        let mut all = vec![DVec3::ZERO; vertices];
+        self.order.iter().zip(unknowns).for_each(|(&v, d)| all[v as usize] = *d);
+        all
+    }
+
     /// Adds a symmetric `block` (N/m) between unknowns with these shares; pairs without a block in the pattern are skipped.
     pub(crate) fn add(&self, members: &[(u32, f64)], block: DMat3, blocks: &mut [DMat3]) {
         for (k, &(i, w)) in members.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Newton steps of the whole cloth, every vertex its own unknown.
 //!
-//! The true Hessian ([`HessianKind::True`]) keeps compression up to the buckling stress of a triangle. It is closer to the energy than the projected
-//! one and may be indefinite. A step solves with it inexactly, by conjugate gradients that the factor of the projected Hessian preconditions
+//! The Hessian of a step keeps compression up to the buckling stress of a triangle ([`HessianKind::UpToBuckling`]). It is closer to the energy than
+//! the projected one and may be indefinite. A step solves with it inexactly, by conjugate gradients that the factor of the projected Hessian preconditions
 //! ([`Solver`]); after a rejected step the next one solves with the projected Hessian.
 
 use glam::{DMat3, DVec3};
@@ -78,13 +78,11 @@ impl FullSpace {
             own[v as usize] = blocks[start as usize] + DMat3::from_diagonal(DVec3::splat(*shift));
         }
         if !std::mem::take(projects) {
-            cloth.hessian_in(layout, HessianKind::True, x, contacts, blocks);
+            cloth.hessian_in(layout, HessianKind::UpToBuckling, x, contacts, blocks);
         }
         let mut unknowns: Vec<DVec3> = layout.order.iter().map(|&v| -gradient[v as usize]).collect();
         solver.solve(&layout.pattern, blocks, &damped, STEP_TOLERANCE, &mut unknowns);
-        d.clear();
-        d.resize(x.len(), DVec3::ZERO);
-        layout.order.iter().zip(&unknowns).for_each(|(&v, step)| d[v as usize] = *step);
+        *d = layout.scatter(&unknowns, x.len());
         Ok(())
     }
 
