@@ -388,10 +388,9 @@ impl<'b> Contacts<'b> {
         self.face_contacts.closed = true;
     }
 
-    /// Adds contact places near rest, if there were some already; returns how many.
+    /// Adds contact places near rest; returns how many.
     pub(crate) fn extend_face_contacts(&mut self, x: &[DVec3]) -> usize {
-        let FaceContacts { closed: false, places, .. } = &self.face_contacts else { return 0 };
-        let (false, Some(body)) = (places.is_empty(), self.body()) else { return 0 };
+        let Some(body) = self.body().filter(|_| !self.face_contacts.closed) else { return 0 };
         let pairs = body.crossing_pairs(&self.garment(x.to_vec()));
         self.face_contacts.add_to(body, x, &pairs, 0.0)
     }
