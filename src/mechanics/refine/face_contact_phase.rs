@@ -1,12 +1,12 @@
 //! Contact places within triangles, from equilibrium to equilibrium.
 //!
-//! At an equilibrium, triangles that the body passes through receive contact places (`Contacts::update_face_contacts`); the cloth then
-//! descends to the next equilibrium. Places are also added on the way there, and removed for good where the cloth does not rest with them.
+//! Near an equilibrium, triangles that the body passes through receive contact places; at one the places are updated (`Contacts::update_face_contacts`), and the
+//! cloth descends to the next equilibrium. They are removed for good where the cloth does not rest with them.
 
 use crate::mechanics::energy::FaceUpdate;
 use crate::mechanics::newton::NewtonState;
 
-/// The phase: since which step the places have changed.
+/// The phase: since which step the cloth has had to rest with its places.
 #[derive(Debug, Default)]
 pub(super) struct FaceContactPhase {
     since: Option<usize>,
@@ -33,6 +33,7 @@ impl FaceContactPhase {
         }
         let near_rest = may_add && descent.residual < options.max_residual;
         if near_rest && descent.contacts.extend_face_contacts(&descent.x) > 0 {
+            self.since.get_or_insert(iteration);
             refreshed(descent);
             changed = true;
         }
