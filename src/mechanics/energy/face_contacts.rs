@@ -224,32 +224,43 @@ impl FaceContacts {
     /// how many.
     fn add(&mut self, triangle: &Triangle, body: &Body, x: &[DVec3], within: f64) -> usize {
         let corners = triangle.vertices;
-        let options = self.options;
-        let offset = place_offset(&self.thickness, triangle, &options);
-        let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
-        let all: Vec<Place> = lattice::lattice(triangle.longest_side_m())
-            .map(|shares| Place { corners, shares, offset, stiffness })
-            .collect();
-        let at: Vec<DVec3> = all.iter().map(|place| place.at(x)).collect();
-        let found = body.nearest_all(&at);
-        let out = found.iter().zip(0..).filter(|(nearest, i)| all[*i].leads_out(nearest, x));
-        let mut deepest: Vec<(f64, usize)> = out.map(|(nearest, i)| (nearest.signed_distance, i)).collect();
-        deepest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let offset = place_offset(&self.thickness, triangle, &self.options);
         let present: Vec<Place> = self.places.iter().filter(|p| p.corners == corners).copied().collect();
         let mut added = 0;
-        for (distance, i) in deepest {
+        for (distance, place) in self.lattice_of(triangle, body, x) {
             let first = added == 0 && distance < offset + within;
             let wanted = first || distance < 0.0;
-            if !wanted || added == options.max_new_places {
+            if !wanted || added == self.options.max_new_places {
                 break;
             }
-            let is_new = present.iter().all(|p| p.shares != all[i].shares);
-            if is_new {
+            if present.iter().all(|p| p.shares != place.shares) {
                 added += 1;
-                self.places.push(all[i]);
+                self.places.push(place);
             }
         }
         added
+    }
+
+    /// The points of a triangle's lattice as places, each with its signed distance (m), the deepest first, but for those whose way out of the body does
+    /// not lead out of the cloth.
+    fn lattice_of(&self, triangle: &Triangle, body: &Body, x: &[DVec3]) -> Vec<(f64, Place)> {
+        let offset = place_offset(&self.thickness, triangle, &self.options);
+        let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
+        let place = |shares| Place { corners: triangle.vertices, shares, offset, stiffness };
+        let all: Vec<Place> = lattice::lattice(triangle.longest_side_m()).map(place).collect();
+        let found = body.nearest_all(&all.iter().map(|place| place.at(x)).collect::<Vec<_>>());
+        let out = all.into_iter().zip(&found).filter(|(place, nearest)| place.leads_out(nearest, x));
+        let mut deepest: Vec<(f64, Place)> = out.map(|(place, nearest)| (nearest.signed_distance, place)).collect();
+        deepest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        deepest
+    }
+
+    /// Whether no triangle of these `pairs` is deeper in the body than the offset of a place is raised at most.
+    pub(super) fn is_shallow(&self, body: &Body, x: &[DVec3], pairs: &[[u32; 2]]) -> bool {
+        pairs.chunk_by(|a, b| a[0] == b[0]).all(|of_one| {
+            let places = self.lattice_of(&self.triangles[of_one[0][0] as usize], body, x);
+            places.first().is_none_or(|(distance, _)| *distance > -self.options.max_offset_raise_m)
+        })
     }
 
     /// Raises the offset of the places of a triangle; returns how many.

@@ -31,8 +31,8 @@ mod separator;
 pub mod sparsity;
 mod vertex_ring;
 
-pub use cloth::{Cloth, Scratch};
 pub(crate) use cloth::MIN_BODY_RADIUS_M;
+pub use cloth::{Cloth, Scratch};
 pub use contact::Contacts;
 pub(crate) use contact::{FaceUpdate, TOUCH_MARGIN_M};
 pub use error::EnergyError;
