@@ -388,8 +388,8 @@ impl<'b> Contacts<'b> {
         self.face_contacts.closed = true;
     }
 
-    /// Adds contact places near rest; returns how many. The `first` ones are added only where no triangle is deep in the body: such cloth is brought to
-    /// rest without places first, and then moved off the body.
+    /// Adds contact places near rest; returns how many. The `first` ones are added only where no triangle is deep in the body: such cloth is
+    /// brought to rest without places first, and then moved off the body.
     pub(crate) fn extend_face_contacts(&mut self, x: &[DVec3], first: bool) -> usize {
         let Some(body) = self.body().filter(|_| !self.face_contacts.closed) else { return 0 };
         let pairs = body.crossing_pairs(&self.garment(x.to_vec()));

@@ -5,7 +5,7 @@
 //! contact places: the points of a lattice in the triangle that are deepest in the body. A place is Σ w x over the corners. It
 //! acts as a gap between the cloth and a plane of the body ([`Gap`]), with friction, and releases as a vertex does. If the
 //! places of a triangle are all outside and the triangle still intersects the body, their offset is raised. [`Contacts`](super::Contacts)
-//! repeats this each time the solve has converged.
+//! repeats this each time the solve has converged; near rest it adds places before, where no triangle is deep in the body.
 //!
 //! A place inside the body whose shortest way out leads back through the cloth, or along it, is ignored: pushing it out would pull
 //! a limb farther through.
@@ -241,8 +241,8 @@ impl FaceContacts {
         added
     }
 
-    /// The points of a triangle's lattice as places, each with its signed distance (m), the deepest first, but for those whose way out of the body does
-    /// not lead out of the cloth.
+    /// The points of a triangle's lattice as places, each with its signed distance (m), the deepest first, but for those whose way out of the body
+    /// does not lead out of the cloth.
     fn lattice_of(&self, triangle: &Triangle, body: &Body, x: &[DVec3]) -> Vec<(f64, Place)> {
         let offset = place_offset(&self.thickness, triangle, &self.options);
         let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
