@@ -1,6 +1,7 @@
 //! Curvature of the energy about a state of equilibrium: its softest directions, and the directions in which it decreases.
 //!
-//! H is the true Hessian of membrane and bending, plus the stiffness of contact and friction as it is in that state. B is a positive definite matrix near H that has been factorised: the projected Hessian of Newton's method.
+//! H is the true Hessian of membrane and bending, plus the stiffness of contact and friction as it is in that state. B is a positive
+//! definite matrix near H that has been factorised: the projected Hessian of Newton's method.
 //! With B = L Lᵀ, Lanczos' method on L⁻¹ H L⁻ᵀ finds the smallest λ with H z = λ B z, z = L⁻ᵀ y. Most of the spectrum lies near one, so
 //! soft and negative directions are separated from it and converge first. By Sylvester's law of inertia the number of negative λ equals the
 //! number of independent directions in which the energy decreases, for any B; a factor in single precision therefore suffices. (On B⁻¹H in the
@@ -70,7 +71,7 @@ impl HessianOperator<'_> {
 
     /// Lanczos' method with the factor in `solver`; a step costs a solve and a product.
     pub(crate) fn lanczos(&self, max_steps: usize, solver: &mut Solver) -> Ritz {
-        let n = self.pattern.starts.len() - 1;
+        let n = self.pattern.unknowns();
         let mut basis = Basis::default();
         let size = max_steps.min(3 * n);
         // Row by row.

@@ -2,8 +2,8 @@
 //!
 //! One group for each mechanism, in the order in which a solve meets them. `partwise bench ablation` changes one option at a time
 //! (`docs/guide/solver.md`). Numbers of steps without a comparison are those of its 21 small drapes together (the columns "before", 545 with the
-//! defaults); an eighth more or less is chance. Options are set by `--solver GROUP.KEY=VALUE`, in a job (`[settings.solver.GROUP]`) and in a sweep; they are for
-//! experiments, and what was measured was measured with the defaults.
+//! defaults); an eighth more or less is chance. Options are set by `--solver GROUP.KEY=VALUE`, in a job (`[settings.solver.GROUP]`) and in
+//! a sweep; they are for experiments, and what was measured was measured with the defaults.
 //!
 //! Constants that describe the model (stiffness of contact, thickness, friction) or the machine (sizes of chunks) are not here.
 

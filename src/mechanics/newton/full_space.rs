@@ -1,8 +1,8 @@
 //! Newton steps of the whole cloth, every vertex its own unknown.
 //!
 //! The Hessian of a step keeps compression up to the buckling stress of a triangle ([`HessianKind::UpToBuckling`]). It is closer to the energy than
-//! the projected one and may be indefinite. A step solves with it inexactly, by conjugate gradients that the factor of the projected Hessian preconditions
-//! ([`Solver`]); after a rejected step the next one solves with the projected Hessian.
+//! the projected one and may be indefinite. A step solves with it inexactly, by conjugate gradients that the factor of the projected Hessian
+//! preconditions ([`Solver`]); after a rejected step the next one solves with the projected Hessian.
 
 use glam::{DMat3, DVec3};
 

@@ -10,8 +10,8 @@
 //!
 //! A positive matrix may lose a pivot by rounding: where stiffness is a million times that of a neighbour, where triangles are drawn a thousand
 //! times too large, or because a body that goes through itself is no body to its gradients. Such a pivot is replaced by the diagonal entry of the
-//! matrix, and the column below it by zero. Each changes the preconditioner by a matrix of rank two, for which conjugate gradients take up to
-//! two iterations more.
+//! matrix, and the column below it by zero. Each changes the preconditioner by a matrix of rank two, which costs at most two
+//! iterations of conjugate gradients.
 
 use glam::{DMat3, DVec3};
 

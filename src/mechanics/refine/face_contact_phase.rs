@@ -1,7 +1,8 @@
 //! Contact places within triangles, from equilibrium to equilibrium.
 //!
 //! Near an equilibrium, triangles that the body passes through receive contact places; at one the places are updated
-//! (`Contacts::update_face_contacts`), and the cloth descends to the next equilibrium. They are removed for good where the cloth does not rest with them.
+//! (`Contacts::update_face_contacts`), and the cloth descends to the next equilibrium. They are removed for good where the cloth does not
+//! rest with them.
 
 use crate::mechanics::energy::FaceUpdate;
 use crate::mechanics::newton::NewtonState;

@@ -240,7 +240,7 @@ impl Settling<'_, '_, '_> {
         if self.iteration >= self.limit {
             return Ok(State::Ended(Stop::StepsDone));
         }
-        if self.faces.before_step(&mut self.descent, self.iteration, !self.soft) {
+        if self.faces.before_step(&mut self.descent, self.iteration, !self.soft && self.options.self_contact) {
             self.stall = StallDetection::default();
         }
         if std::mem::take(&mut self.fresh) {
