@@ -26,7 +26,6 @@
 //! points in the doubly covered pocket may count as outside. An open body has no inside: see [`Body::new_open`]. The sides of
 //! a covering cloth are those of its normals; in a pleat the nearest sheet decides.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use glam::{DVec3, IVec3};
@@ -34,6 +33,7 @@ use parry3d_f64::partitioning::Bvh;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{Triangle, TrianglePointLocation};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use super::tree::{Nearest, Tree};
 use crate::base::math;
@@ -107,7 +107,7 @@ pub struct Body {
     cover: Option<Cover>,
     /// Signed distances at lattice points that were computed before, m. A value depends on its point alone, so the cache
     /// does not change results.
-    lattice: Arc<Mutex<HashMap<IVec3, f64>>>,
+    lattice: Arc<Mutex<FxHashMap<IVec3, f64>>>,
     /// The boxes of the triangles, made at the first use.
     boxes: Arc<OnceLock<Bvh>>,
 }
@@ -220,20 +220,23 @@ impl Body {
     /// Signed distances (m) at these points of the lattice of spacing [`LATTICE_SIDE`], in their order. Contact needs them
     /// around every vertex that touches, and later drapes and metrics need the same ones again.
     pub(crate) fn at_lattice(&self, points: &[IVec3]) -> Vec<f64> {
-        let mut missing: Vec<IVec3> = {
+        let known: Vec<Option<f64>> = {
             let known = self.lock_lattice();
-            points.iter().filter(|i| !known.contains_key(i)).copied().collect()
+            points.iter().map(|i| known.get(i).copied()).collect()
         };
+        let unknown = points.iter().zip(&known).filter(|(_, distance)| distance.is_none());
+        let mut missing: Vec<IVec3> = unknown.map(|(i, _)| *i).collect();
         missing.sort_unstable_by_key(IVec3::to_array);
         missing.dedup();
         let at: Vec<DVec3> = missing.iter().map(|i| i.as_dvec3() * LATTICE_SIDE).collect();
         let found = self.nearest_all(&at).into_iter().map(|near| near.signed_distance);
-        let mut known = self.lock_lattice();
-        known.extend(missing.into_iter().zip(found));
-        points.iter().map(|i| known.get(i).copied().unwrap_or_default()).collect()
+        let mut lattice = self.lock_lattice();
+        lattice.extend(missing.into_iter().zip(found));
+        let stored = |i: &IVec3| lattice.get(i).copied().unwrap_or_default();
+        points.iter().zip(known).map(|(i, distance)| distance.unwrap_or_else(|| stored(i))).collect()
     }
 
-    fn lock_lattice(&self) -> MutexGuard<'_, HashMap<IVec3, f64>> {
+    fn lock_lattice(&self) -> MutexGuard<'_, FxHashMap<IVec3, f64>> {
         self.lattice.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
