@@ -2,8 +2,10 @@
 //!
 //! A skirt's waist is held while the cloth falls into its folds, as a dresser would. Friction and the shape of the hips
 //! decide whether it stays up: near rest, the steps continue with nothing held. If the cloth rests and its waist has sunk little, this
-//! is the drape; if it slides, it is brought to rest held, and a warning says so. A large garment is released on its coarsest cloth first
-//! ([`Levels`]), at its rest there: if it slides, it is not released at full resolution.
+//! is the drape; if it slides, it is brought to rest held, and a warning says so.
+//!
+//! A large garment is released on its coarser cloths ([`Levels`]), from the coarsest to the finest, after they have rested held. If it slides
+//! on one of them, it is not released at full resolution; otherwise full resolution begins where they rest released, with nothing held.
 
 use std::ops::ControlFlow;
 
@@ -52,48 +54,65 @@ pub(crate) fn settle_and_release(
     observer: Observer<'_>,
 ) -> Result<ReleasedDrape, DrapeError> {
     let cloth = &levels.cloth;
-    let asked = scene.releases_held && !scene.held.is_empty() && settings.refine == Refine::Converged;
-    let slid = if asked { slides_when_coarse(scene, settings, levels, &start.0, observer)? } else { None };
-    let releases = asked && slid.is_none();
-    let until = releases.then_some(RELEASE_RESIDUAL);
-    let held = refine_from(scene, settings, cloth, ground, start, until, observer)?;
-    let held_positions = held.positions.clone();
-    if !releases || held.stop != Stop::Converged {
-        let release = slid.map(|sank_m| Release::Slides { sank_m, is_coarse: true });
-        return Ok(ReleasedDrape { cloth: None, refined: held, held_positions, release });
+    let settle =
+        |start, until, observer: Observer<'_>| refine_from(scene, settings, cloth, ground, start, until, observer);
+    let held_drape = |refined: Refined, release| {
+        Ok(ReleasedDrape { cloth: None, held_positions: refined.positions.clone(), refined, release })
+    };
+    if !scene.releases_held || scene.held.is_empty() || settings.refine != Refine::Converged {
+        return held_drape(settle(start, None, observer)?, None);
     }
+    let (start, from) = start;
+    let (near_rest, reached) = match release_when_coarse(scene, settings, levels, &start, observer)? {
+        Coarse::Slides { sank_m } => {
+            let rested = settle((start, StartsFrom::Parts), None, observer)?;
+            return held_drape(rested, Some(Release::Slides { sank_m, is_coarse: true }));
+        }
+        Coarse::Stays(reached) => (None, reached),
+        Coarse::Absent => {
+            let near_rest = settle((start.clone(), from), Some(RELEASE_RESIDUAL), observer)?;
+            if near_rest.stop != Stop::Converged {
+                return held_drape(near_rest, None);
+            }
+            let reached = near_rest.positions.clone();
+            (Some(near_rest), reached)
+        }
+    };
+    let (held_positions, from) = match &near_rest {
+        Some(near_rest) => (near_rest.positions.clone(), StartsFrom::Rest),
+        None => (start, StartsFrom::Parts),
+    };
+    let steps_before = near_rest.as_ref().map_or(0, |near_rest| near_rest.steps);
     let free = cloth_of(scene, settings, &[])?;
-    let mut contacts = free.contacts(&scene.body, &held.positions);
-    contacts.stiffen(held.contact_stiffness / contacts.stiffness());
-    contacts.update(&held.positions);
-    contacts.refresh(&held.positions);
+    let mut contacts = free.contacts(&scene.body, &reached);
+    if let Some(near_rest) = &near_rest {
+        contacts.stiffen(near_rest.contact_stiffness / contacts.stiffness());
+        contacts.update(&reached);
+        contacts.refresh(&reached);
+    }
     let sank = |x: &[DVec3]| mean_sink(&cloth.held, &held_positions, x);
-    let options = released_steps(settings);
     let mut stopped = false;
-    let released = refine::refine_with(&free, contacts, held.positions.clone(), &options, &mut |step| {
+    let released = refine::refine_with(&free, contacts, reached, &released_steps(settings), &mut |step| {
         if sank(step.positions) > MAX_SINK_M {
             return ControlFlow::Break(());
         }
-        let flow = observer(&Step { iteration: held.steps + step.iteration, ..*step });
+        let flow = observer(&Step { iteration: steps_before + step.iteration, ..*step });
         stopped |= flow.is_break();
         flow
     })?;
     let sank_m = sank(&released.positions);
-    if released.stop == Stop::Converged && sank_m <= MAX_SINK_M {
-        let (cloth, refined) = (Some(free), after(held, released));
-        return Ok(ReleasedDrape { cloth, refined, held_positions, release: Some(Release::Stays { sank_m }) });
+    let after_all = |later| match near_rest {
+        Some(near_rest) => after(near_rest, later),
+        None => later,
+    };
+    if stopped || (released.stop == Stop::Converged && sank_m <= MAX_SINK_M) {
+        let release = (!stopped).then_some(Release::Stays { sank_m });
+        return Ok(ReleasedDrape { cloth: Some(free), refined: after_all(released), held_positions, release });
     }
-    if stopped {
-        let refined = Refined { stop: Stop::Interrupted, ..held };
-        return Ok(ReleasedDrape { cloth: None, refined, held_positions, release: None });
-    }
-    let start = (held_positions, StartsFrom::Rest);
-    let rested = refine_from(scene, settings, cloth, ground, start, None, &mut |step| {
-        observer(&Step { iteration: held.steps + step.iteration, ..*step })
+    let rested = settle((held_positions, from), None, &mut |step: &Step<'_>| {
+        observer(&Step { iteration: steps_before + step.iteration, ..*step })
     })?;
-    let held_positions = rested.positions.clone();
-    let release = Some(Release::Slides { sank_m, is_coarse: false });
-    Ok(ReleasedDrape { cloth: None, refined: after(held, rested), held_positions, release })
+    held_drape(after_all(rested), Some(Release::Slides { sank_m, is_coarse: false }))
 }
 
 /// Options of the steps after a release.
@@ -108,30 +127,50 @@ fn mean_sink(held: &[bool], before: &[DVec3], after: &[DVec3]) -> f64 {
     sinks().sum::<f64>() / sinks().count().max(1) as f64
 }
 
-/// How far the waist has sunk, m, if the garment's coarsest cloth slides when released from `start`, the positions of the full garment, m;
-/// `None` if it stays up, or if the garment has no coarser cloth. `observer` receives the steps as step 0.
-fn slides_when_coarse(
+/// What a garment does when its held edges are released on its coarser cloths.
+enum Coarse {
+    /// It has none.
+    Absent,
+    /// It slides; how far its waist had sunk when that was clear, m.
+    Slides { sank_m: f64 },
+    /// It stays up, and the full garment is here then, m.
+    Stays(Vec<DVec3>),
+}
+
+/// Releases the garment on its coarser cloths, from the coarsest to the finest, beginning at `start`, the positions of the full garment, m.
+/// `observer` receives the steps as step 0.
+fn release_when_coarse(
     scene: &Scene,
     settings: &Settings,
     levels: &Levels,
     start: &[DVec3],
     observer: Observer<'_>,
-) -> Result<Option<f64>, SolveError> {
-    let number = levels.coarser(scene).len();
-    let Some(level) = levels.coarser(scene).last() else { return Ok(None) };
-    let (held, from) = (&level.cloth().held, levels.restrict(number, start));
-    let Some(free) = level.released(&levels.cloth) else { return Ok(None) };
-    let contacts = free.contacts(&scene.body, &from);
-    let mut slides = None;
-    refine::refine_with(&free, contacts, from.clone(), &released_steps(settings), &mut |step| {
-        let sank_m = mean_sink(held, &from, step.positions);
-        if sank_m > MAX_SINK_M {
-            slides = Some(sank_m);
-            return ControlFlow::Break(());
+) -> Result<Coarse, SolveError> {
+    let coarser = levels.coarser(scene);
+    let mut reached = start.to_vec();
+    for number in (1..=coarser.len()).rev() {
+        let level = &coarser[number - 1];
+        let Some(free) = level.released(&levels.cloth) else { return Ok(Coarse::Absent) };
+        let (held, before, from) =
+            (&level.cloth().held, levels.restrict(number, start), levels.restrict(number, &reached));
+        let contacts = free.contacts(&scene.body, &from);
+        let mut slides = None;
+        // Whether the coarse equilibrium lasts is not checked: its folds are not those of the full garment.
+        let options = RefineOptions { lasting: false, ..released_steps(settings) };
+        let rested = refine::refine_with(&free, contacts, from, &options, &mut |step| {
+            let sank_m = mean_sink(held, &before, step.positions);
+            if sank_m > MAX_SINK_M {
+                slides = Some(sank_m);
+                return ControlFlow::Break(());
+            }
+            observer(&Step { iteration: 0, positions: start, at_rest: false, ..*step })
+        })?;
+        if let Some(sank_m) = slides {
+            return Ok(Coarse::Slides { sank_m });
         }
-        observer(&Step { iteration: 0, positions: start, at_rest: false, ..*step })
-    })?;
-    Ok(slides)
+        reached = levels.prolong(number, &reached, rested.positions);
+    }
+    Ok(if coarser.is_empty() { Coarse::Absent } else { Coarse::Stays(reached) })
 }
 
 /// The end of `second`, with the steps of `first` before it.
