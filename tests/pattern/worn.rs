@@ -1,5 +1,6 @@
 //! Patterns put on the dress form, and meshes with open seams.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use partwise::body::{BodySpec, dress_form};
@@ -129,7 +130,8 @@ fn a_waist_is_released_where_friction_holds_it_and_stays_held_where_it_slides() 
     }
 }
 
-/// A garment with a coarser one is released on that first: where it slides there, its waist never moves at full resolution.
+/// A garment with a coarser one is released on that first: where it slides there, its waist never moves at full resolution, and where it
+/// stays up, full resolution begins released.
 #[test]
 fn a_waist_that_slides_on_coarser_cloth_is_not_released_at_full_resolution() {
     let loaded = SceneSpec { edge_cm: 4.0, ..SceneSpec::new("form", asset("skirt")) }.load().unwrap();
@@ -140,18 +142,41 @@ fn a_waist_that_slides_on_coarser_cloth_is_not_released_at_full_resolution() {
         if has_coarser {
             settings.solver.nested_iteration.min_vertices = scene.garment.vertex_count() / 8;
         }
-        let mut released_steps = 0;
+        let (mut released_steps, mut held_steps) = (0, 0);
         let drape = drape(scene, &settings, &mut |step| {
             let moved = |v: &u32| step.positions[*v as usize] != scene.garment.positions[*v as usize];
-            released_steps += usize::from(step.iteration > 0 && scene.held.iter().any(moved));
-            std::ops::ControlFlow::Continue(())
+            let released = scene.held.iter().any(moved);
+            released_steps += usize::from(step.iteration > 0 && released);
+            held_steps += usize::from(step.iteration > 0 && !released);
+            ControlFlow::Continue(())
         })
         .unwrap();
         let stays = friction > 0.0;
         assert_eq!(matches!(drape.release, Some(Release::Stays { .. })), stays, "{:?}", drape.release);
         assert_eq!(released_steps > 0, stays || !has_coarser, "{has_coarser} {friction}: {released_steps}");
+        assert_eq!(held_steps == 0, stays, "{has_coarser} {friction}: {held_steps}");
         assert_eq!(drape.state.unwrap().stop, Stop::Converged);
     }
+}
+
+/// A release that is interrupted ends where it is, and is neither a slide nor a garment that stays up.
+#[test]
+fn an_interrupted_release_has_no_result() {
+    let loaded = SceneSpec { edge_cm: 4.0, ..SceneSpec::new("form", asset("skirt")) }.load().unwrap();
+    let scene = &loaded.scene;
+    let mut last = Vec::new();
+    let drape = drape(scene, &Settings::default(), &mut |step| {
+        let moved = |v: &u32| step.positions[*v as usize] != scene.garment.positions[*v as usize];
+        if step.iteration == 0 || !scene.held.iter().any(moved) {
+            return ControlFlow::Continue(());
+        }
+        last = step.positions.to_vec();
+        ControlFlow::Break(())
+    })
+    .unwrap();
+    assert_eq!((drape.release, drape.state.unwrap().stop), (None, Stop::Interrupted));
+    assert!(!last.is_empty() && drape.positions == last);
+    assert!(drape.warnings.iter().all(|warning| !warning.contains("stay up")), "{:?}", drape.warnings);
 }
 
 #[test]
