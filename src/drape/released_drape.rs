@@ -64,12 +64,12 @@ pub(crate) fn settle_and_release(
     }
     let (start, from) = start;
     let (near_rest, reached) = match release_when_coarse(scene, settings, levels, &start, observer)? {
-        Coarse::Slides { sank_m } => {
+        CoarseRelease::Slides { sank_m } => {
             let rested = settle((start, StartsFrom::Parts), None, observer)?;
             return held_drape(rested, Some(Release::Slides { sank_m, is_coarse: true }));
         }
-        Coarse::Stays(reached) => (None, reached),
-        Coarse::Absent => {
+        CoarseRelease::Stays(reached) => (None, reached),
+        CoarseRelease::Absent => {
             let near_rest = settle((start.clone(), from), Some(RELEASE_RESIDUAL), observer)?;
             if near_rest.stop != Stop::Converged {
                 return held_drape(near_rest, None);
@@ -128,7 +128,7 @@ fn mean_sink(held: &[bool], before: &[DVec3], after: &[DVec3]) -> f64 {
 }
 
 /// What a garment does when its held edges are released on its coarser cloths.
-enum Coarse {
+enum CoarseRelease {
     /// It has none.
     Absent,
     /// It slides; how far its waist had sunk when that was clear, m.
@@ -145,12 +145,12 @@ fn release_when_coarse(
     levels: &Levels,
     start: &[DVec3],
     observer: Observer<'_>,
-) -> Result<Coarse, SolveError> {
+) -> Result<CoarseRelease, SolveError> {
     let coarser = levels.coarser(scene);
     let mut reached = start.to_vec();
     for number in (1..=coarser.len()).rev() {
         let level = &coarser[number - 1];
-        let Some(free) = level.released(&levels.cloth) else { return Ok(Coarse::Absent) };
+        let Some(free) = level.released(&levels.cloth) else { return Ok(CoarseRelease::Absent) };
         let (held, before, from) =
             (&level.cloth().held, levels.restrict(number, start), levels.restrict(number, &reached));
         let contacts = free.contacts(&scene.body, &from);
@@ -166,11 +166,11 @@ fn release_when_coarse(
             observer(&Step { iteration: 0, positions: start, at_rest: false, ..*step })
         })?;
         if let Some(sank_m) = slides {
-            return Ok(Coarse::Slides { sank_m });
+            return Ok(CoarseRelease::Slides { sank_m });
         }
         reached = levels.prolong(number, &reached, rested.positions);
     }
-    Ok(if coarser.is_empty() { Coarse::Absent } else { Coarse::Stays(reached) })
+    Ok(if coarser.is_empty() { CoarseRelease::Absent } else { CoarseRelease::Stays(reached) })
 }
 
 /// The end of `second`, with the steps of `first` before it.
