@@ -4,8 +4,9 @@
 //! decide whether it stays up: near rest, the steps continue with nothing held. If the cloth rests and its waist has sunk little, this
 //! is the drape; if it slides, it is brought to rest held, and a warning says so.
 //!
-//! A large garment is released on its coarser cloths ([`Levels`]), from the coarsest to the finest, after they have rested held. If it slides
-//! on one of them, it is not released at full resolution; otherwise full resolution begins where they rest released, with nothing held.
+//! A large garment is released on its coarser cloths ([`Levels`]), from the coarsest to the finest; where it comes from PARTs, they have rested
+//! held before ([`approach`](super::approach)). If it slides on one of them, it is not released at full resolution; otherwise full resolution
+//! begins where they rest released, with nothing held.
 
 use std::ops::ControlFlow;
 
@@ -25,18 +26,18 @@ use crate::scene::Scene;
 /// A waist that sinks farther than this slides, m: from the waist to the hips it is twice as far.
 const MAX_SINK_M: f64 = 0.1;
 
-/// Residual over weight below which the edges are released. An asymmetric circle skirt in cotton (15,493 vertices) takes 111 steps where it first
-/// rests held, and 50, 35 and 41 if released at 0.01, 0.03 and 0.1.
+/// Residual over weight below which the edges of a garment without coarser cloth are released. An asymmetric circle skirt in cotton (15,493 vertices)
+/// took 111 steps where it first rested held, and 50, 35 and 41 if released at 0.01, 0.03 and 0.1, before it began released.
 const RELEASE_RESIDUAL: f64 = 0.03;
 
-/// Steps it may take to rest after that. Heuristic: skirts of 10,000 to 26,000 vertices in cotton take 35 to 91 in all.
+/// Steps it may take to rest after that. Heuristic: skirts and trousers of 10,000 to 26,000 vertices in cotton take 26 to 84 at full resolution.
 const MAX_RELEASED_STEPS: usize = 160;
 
 /// A drape, after the release of its held edges if the scene asks for it.
 pub(crate) struct ReleasedDrape {
-    /// The cloth with nothing held, where it stays up so.
+    /// The cloth with nothing held, where it stays up so or its release was interrupted.
     pub(crate) cloth: Option<Cloth>,
-    /// The drape at rest.
+    /// Where the steps ended.
     pub(crate) refined: Refined,
     /// Positions with the edges held, m: a start for the same garment in another fabric or by another table.
     pub(crate) held_positions: Vec<DVec3>,
@@ -127,9 +128,9 @@ fn mean_sink(held: &[bool], before: &[DVec3], after: &[DVec3]) -> f64 {
     sinks().sum::<f64>() / sinks().count().max(1) as f64
 }
 
-/// What a garment does when its held edges are released on its coarser cloths.
+/// Result of a release on coarser cloth.
 enum CoarseRelease {
-    /// It has none.
+    /// The garment has no coarser cloth.
     Absent,
     /// It slides; how far its waist had sunk when that was clear, m.
     Slides { sank_m: f64 },
