@@ -111,9 +111,12 @@ impl StageResults {
         // PARTs alone may shorten cloth that still unfolds.
         let rests = state.as_ref().filter(|state| state.stop == Stop::Converged);
         warnings.extend(rests.and_then(|_| crushed_warning(scene.area_share(&positions))));
-        let inside = depths(scene, &ground, &positions).into_iter().filter(|&depth| depth > 0.0);
+        let (depths, self_intersecting_pairs) = rayon::join(
+            || depths(scene, &ground, &positions),
+            || self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len(),
+        );
+        let inside = depths.into_iter().filter(|&depth| depth > 0.0);
         let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
-        let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
         let (folds, foldable) = folds.map_or((None, None), |(folds, foldable)| (Some(folds), foldable));
         Drape {
             surface: ground.surface,

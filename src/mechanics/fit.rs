@@ -10,7 +10,7 @@
 //! | ε | largest principal strain | % in results, – inside |
 //! | p | contact pressure | kPa |
 //!
-//! Limits: wrinkles finer than an edge are not resolved, and the negative strain across a fold is not reported. The pressure is that of the
+//! Limits: slivers are left out, since their height at rest is not that of the cloth (`energy::membrane`); wrinkles finer than an edge are not resolved, and the negative strain across a fold is not reported. The pressure is that of the
 //! penalty at rest; it is smooth over about one edge.
 
 use glam::DVec3;
@@ -46,7 +46,7 @@ pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiff
     let mut sum = vec![0.0; x.len()];
     let mut area = vec![0.0; x.len()];
     let mut strains: Vec<f64> = Vec::with_capacity(cloth.triangles.len());
-    for triangle in &*cloth.triangles {
+    for triangle in cloth.triangles.iter().filter(|triangle| !triangle.sliver) {
         let strain = 100.0 * principal_strain(triangle.deformation(x));
         strains.push(strain);
         for v in triangle.vertices {

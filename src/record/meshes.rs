@@ -33,8 +33,13 @@ pub(super) fn whole(mesh: &TriMesh) -> Mesh3D {
 }
 
 /// A mesh in one colour.
-pub(super) fn plain(mesh: &TriMesh, [r, g, b]: Rgb) -> Mesh3D {
-    whole(mesh).with_albedo_factor(Rgba32::from_rgb(r, g, b))
+pub(super) fn plain(mesh: &TriMesh, colour: Rgb) -> Mesh3D {
+    coloured(whole(mesh), colour)
+}
+
+/// The same mesh in one colour.
+pub(super) fn coloured(mesh: Mesh3D, [r, g, b]: Rgb) -> Mesh3D {
+    mesh.with_albedo_factor(Rgba32::from_rgb(r, g, b))
 }
 
 /// Positions and normals alone, for a mesh whose triangles are logged already.

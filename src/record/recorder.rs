@@ -69,11 +69,13 @@ impl Recorder {
                 recording.views_sent = true;
             }
             recording.at(index, 1);
-            recording.log_mesh(paths::GARMENT, &meshes::plain(garment, palette::CLOTH))?;
+            let placed = meshes::whole(garment);
+            recording.log_mesh(paths::GARMENT, &meshes::coloured(placed.clone(), palette::CLOTH))?;
             if recording.layout().method.is_none() && !recording.layout().table4 {
-                recording.log_mesh(paths::DISTANCE, &meshes::plain(garment, [255; 3]))?;
-                recording.log_mesh(paths::PARTS, &recording.cells.shape())?;
-                recording.log_mesh(paths::FORCE, &recording.cells.shape())?;
+                recording.log_mesh(paths::DISTANCE, &meshes::coloured(placed, [255; 3]))?;
+                let cells = recording.cells.shape();
+                recording.log_mesh(paths::PARTS, &cells)?;
+                recording.log_mesh(paths::FORCE, &cells)?;
             }
             recording.triangles_once(paths::DRAPE)?;
             recording.log_mesh(paths::DRAPE, &meshes::colours(palette::by_component(garment)))

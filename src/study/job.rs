@@ -192,8 +192,8 @@ impl Job {
         cache: Option<&ReferenceCache>,
         observer: Observer<'_>,
     ) -> Result<Measured, EvaluateError> {
-        let ease = GirthEase::all(scene, &drape.positions);
-        let metrics = Metrics::of(scene, drape).with_ease(&ease);
+        let (ease, metrics) = rayon::join(|| GirthEase::all(scene, &drape.positions), || Metrics::of(scene, drape));
+        let metrics = metrics.with_ease(&ease);
         let of_fabrics = scene.fabrics(&self.settings.fabric).iter().flat_map(Fabric::warnings).collect();
         let warnings = [metrics.warnings(scene), of_fabrics].concat();
         let options = EvaluateOptions { cache: cache.cloned(), spread_starts: self.spread_starts };

@@ -35,7 +35,8 @@
 //!
 //! A sliver, of height h under ℓ/50 over its longest side ℓ, would be stiffer across than its neighbours by ℓ/h, and would invert when a
 //! corner moves by h, which stops a solver. It is given the height ℓ/50, with its longest side along the weft and r = 0, so that it
-//! resists stretch along that side, and across it only beyond that height.
+//! resists stretch along that side, and across it only beyond that height. A counts as a fiftieth of the area at that height: beyond it the
+//! sliver is then as stiff across as a triangle as high as ℓ, and not fifty times as stiff.
 //!
 //! Limits: constants are those at zero strain; the stiffening of a measured curve is not modelled. Slivers have no grain, no shear
 //! stiffness where they are closed, and may open by ℓ/50.
@@ -45,14 +46,14 @@ use glam::{DMat3, DVec2, DVec3};
 use crate::base::math;
 use crate::garment::fabric::Fabric;
 pub(crate) use crate::mesh::outer;
-use crate::mesh::rest::raised;
+use crate::mesh::rest::{SLIVER, raised};
 
 /// One triangle's rest data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangle {
     /// Its vertices.
     pub vertices: [u32; 3],
-    /// Rest area A, m²; of a sliver the area at its raised height, which does not count as mass.
+    /// Rest area A, m²; of a sliver a fiftieth of the area at its raised height, which does not count as mass.
     pub area: f64,
     /// Gradients b_i of the shape functions, 1/m.
     pub gradients: [DVec2; 3],
@@ -167,11 +168,12 @@ impl Triangle {
         }
         let (sliver, [a, b, c]) = raised(rest);
         let double = (b - a).perp_dot(c - a);
+        let share = if sliver { SLIVER } else { 1.0 };
         // ∇N_i is the opposite side rotated by 90 degrees, over twice the signed area.
         let gradient = |p: DVec2, q: DVec2| (q - p).perp() / double;
         Some(Self {
             vertices,
-            area: 0.5 * double.abs(),
+            area: 0.5 * double.abs() * share,
             gradients: [gradient(b, c), gradient(c, a), gradient(a, b)],
             sliver,
             fabric: 0,
@@ -187,7 +189,8 @@ impl Triangle {
     /// Length of its longest side at rest, m.
     #[must_use]
     pub(crate) fn longest_side_m(&self) -> f64 {
-        2.0 * self.area * self.gradients.iter().map(|b| b.length()).fold(0.0, f64::max)
+        let [_, p, q] = self.gradients;
+        self.gradients.iter().map(|b| b.length()).fold(0.0, f64::max) / p.perp_dot(q).abs()
     }
 
     /// F_u and F_v.
@@ -285,4 +288,30 @@ fn positive_part(a: f64, b: f64, t: f64) -> (f64, f64, f64) {
     }
     // Eigenvector of `top` has the squared components (1 ± half/radius)/2 and product t/(2 radius).
     (top * 0.5 * (1.0 + half / radius), top * 0.5 * (1.0 - half / radius), top * 0.5 * t / radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_open_sliver_is_as_stiff_across_as_a_triangle_as_high_as_its_side() {
+        let fabric = Fabric::by_name("denim").unwrap();
+        let stiffness = Stiffness::new(&Fabric { stretch_warp_n_per_m: fabric.stretch_weft_n_per_m, ..fabric });
+        // Stiffness of the tip, N/m, 10 % above its height at rest.
+        let across = |height: f64, rest_height: f64| {
+            let side = 0.01;
+            let rest = [DVec2::ZERO, DVec2::new(side, 0.0), DVec2::new(0.5 * side, height * side)];
+            let triangle = Triangle::new([0, 1, 2], rest).unwrap();
+            let x = [DVec3::ZERO, DVec3::X * side, DVec3::new(0.5, 1.1 * rest_height, 0.0) * side];
+            let r = triangle.compression_ratio();
+            (triangle.hessian(&stiffness, r, &x, HessianKind::True)[2].y_axis.y, triangle.longest_side_m())
+        };
+        let (regular, _) = across(1.0, 1.0);
+        for height in [1e-2, 1e-4, 1e-5] {
+            let (sliver, longest) = across(height, SLIVER);
+            assert!((sliver / regular - 1.0).abs() < 0.01, "{height}: {sliver} N/m, not {regular}");
+            assert!((longest - 0.01).abs() < 1e-12, "{longest}");
+        }
+    }
 }

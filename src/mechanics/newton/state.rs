@@ -22,7 +22,7 @@ const MAX_REJECTED: usize = 8;
 pub(crate) struct Advance {
     /// Whether a step was taken.
     pub(crate) accepted: bool,
-    /// Its length t over the longest that was tried.
+    /// Its length t over the longest that was tried; zero if none was taken.
     pub(crate) share: f64,
     /// Its length t; over one where it goes on like the one before.
     pub(crate) step_length: f64,
@@ -203,8 +203,9 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             }
         };
         extrapolation.store_step(direction, if accepted { t } else { 0.0 });
-        let mut largest_move_m = 0.0;
+        let (mut share, mut largest_move_m) = (0.0, 0.0);
         if accepted {
+            share = (t / first).min(1.0);
             std::mem::swap(x, trial);
             largest_move_m = x.iter().zip(&*trial).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
         } else {
@@ -212,7 +213,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         }
         self.contacts.refresh(&self.x);
         self.evaluate();
-        Ok(Advance { accepted, share: (t / first).min(1.0), step_length: t, largest_move_m })
+        Ok(Advance { accepted, share, step_length: t, largest_move_m })
     }
 
     /// Begins contact of the cloth with itself.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::map::Rgb;
-use crate::mesh::TriMesh;
+use crate::mesh::{Csr, TriMesh};
 
 /// A garment divided into one cell per vertex, so that each vertex has its own colour up to a sharp border.
 ///
@@ -23,20 +23,30 @@ pub(crate) struct CellMesh {
 impl CellMesh {
     /// Divides `garment` into cells.
     pub(crate) fn new(garment: &TriMesh) -> Self {
-        // The key of a cell's vertex: the owner, and the owner itself (0), the midpoint towards another vertex, or a centroid.
+        // The key of a vertex of a cell: the owner itself (0), the midpoint towards another vertex, or a centroid.
         const MIDPOINT: u64 = 1;
         const CENTROID: u64 = 1 << 33;
-        let mut keys: Vec<(u32, u64)> = (0..garment.positions.len() as u32).map(|v| (v, 0)).collect();
-        for (t, &[a, b, c]) in garment.triangles.iter().enumerate() {
-            for (v, next, previous) in [(a, b, c), (b, c, a), (c, a, b)] {
-                keys.push((v, MIDPOINT + u64::from(next)));
-                keys.push((v, MIDPOINT + u64::from(previous)));
-                keys.push((v, CENTROID + t as u64));
-            }
+        let around = |v: u32, next: u32, previous: u32, t: u64| {
+            [MIDPOINT + u64::from(next), MIDPOINT + u64::from(previous), CENTROID + t].map(|key| (v, key))
+        };
+        let of_triangles = Csr::gathered(garment.positions.len(), || {
+            (0..).zip(&garment.triangles).flat_map(move |(t, &[a, b, c])| {
+                [around(a, b, c, t), around(b, c, a, t), around(c, a, b, t)].into_iter().flatten()
+            })
+        });
+        let mut keys = Csr::default();
+        let mut own = Vec::new();
+        for v in 0..of_triangles.len() {
+            own.clear();
+            own.push(0);
+            own.extend(of_triangles.of(v));
+            own.sort_unstable();
+            own.dedup();
+            keys.push(own.iter().copied());
         }
-        keys.sort_unstable();
-        keys.dedup();
-        let find = |key: (u32, u64)| keys.binary_search(&key).unwrap_or_default() as u32;
+        let find = |(v, key): (u32, u64)| {
+            (keys.range(v as usize).start + keys.of(v as usize).binary_search(&key).unwrap_or_default()) as u32
+        };
         let mut triangles = Vec::with_capacity(6 * garment.triangles.len());
         for (t, &[a, b, c]) in garment.triangles.iter().enumerate() {
             for (v, next, previous) in [(a, b, c), (b, c, a), (c, a, b)] {
@@ -48,9 +58,10 @@ impl CellMesh {
             }
         }
         let place = |values: &[DVec3]| -> Vec<DVec3> {
-            keys.iter()
-                .map(|&(v, kind)| {
-                    let own = values[v as usize];
+            let owners = (0..keys.len()).flat_map(|v| keys.of(v).iter().map(move |&kind| (v, kind)));
+            owners
+                .map(|(v, kind)| {
+                    let own = values[v];
                     if kind == 0 {
                         own
                     } else if kind < CENTROID {
@@ -64,7 +75,8 @@ impl CellMesh {
         };
         let normals = place(&garment.vertex_normals()).into_iter().map(DVec3::normalize_or_zero).collect();
         let mesh = TriMesh::new(place(&garment.positions), triangles);
-        Self { owner: keys.into_iter().map(|(v, _)| v).collect(), mesh, normals }
+        let owner = (0..keys.len()).flat_map(|v| keys.of(v).iter().map(move |_| v as u32)).collect();
+        Self { owner, mesh, normals }
     }
 
     /// The colour of each vertex of the cells, from one per vertex of the garment.
