@@ -71,7 +71,7 @@ pub(super) fn log(recording: &OpenRecording, compared: &Compared<'_>) -> Result<
             let part_of_vertex = with_outside(part_of_vertex, count(part_of_vertex));
             let (parts, triangles) = (count(&part_of_vertex), &recording.garment.triangles);
             let chosen = colour_parts(&part_of_vertex, parts, levels, triangles, &recording.vertex_shade);
-            let cells = CellMesh::new(&draped);
+            let cells = CellMesh::of_values(&draped, &part_of_vertex);
             let colours = rerun_colours(cells.of_vertices(&chosen.of_vertices));
             recording.log(&path, &cells.shape().with_vertex_colors(colours))?;
         }

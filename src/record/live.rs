@@ -123,10 +123,10 @@ impl LiveEncoder {
         }
         for (i, pin) in pins.iter().enumerate() {
             stream.log_static(format!("/pin/{i}/body"), &meshes::plain(pin.body, palette::BODY))?;
-            let cells = CellMesh::new(pin.garment);
             let part_of_vertex = with_outside(&pin.parts.part_of_vertex, pin.parts.len());
             let all = pin.parts.len() + usize::from(part_of_vertex.contains(&(pin.parts.len() as u32)));
             let colours = colour_parts(&part_of_vertex, all, pin.levels, &pin.garment.triangles, &[]);
+            let cells = CellMesh::of_values(pin.garment, &part_of_vertex);
             stream.log_static(format!("/pin/{i}/parts"), &cells.shape())?;
             stream.log_static(format!("/pin/{i}/parts"), &cells.colours(&colours.of_vertices))?;
             let preview = pin.garment.with_positions(pin.preview.to_vec());

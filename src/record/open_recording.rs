@@ -67,6 +67,7 @@ pub(super) struct OpenRecording {
     pub(super) options: RecordOptions,
     pub(super) body: TriMesh,
     pub(super) garment: TriMesh,
+    /// The cells of PARTs and forces: of one table, divided at its borders alone.
     pub(super) cells: CellMesh,
     /// The eye of the views, at the garment alone.
     pub(super) eye: Eye,
@@ -137,7 +138,7 @@ impl OpenRecording {
     /// Replaces the garment. Colours and triangles of the previous one are forgotten.
     pub(super) fn set_garment(&mut self, garment: &TriMesh) {
         self.garment = garment.clone();
-        self.cells = CellMesh::new(garment);
+        self.cells = CellMesh::new(&TriMesh::default());
         self.distance.clear();
         self.vertex_shade.clear();
         self.vertex_colour.clear();
@@ -181,6 +182,13 @@ impl OpenRecording {
     /// Logs a mesh statically, or at the step if meshes are replaceable.
     pub(super) fn log_mesh(&self, path: &str, data: &dyn AsComponents) -> Result<(), RecordError> {
         self.log_as(path, !self.options.replaceable, data)
+    }
+
+    /// Logs the cells of PARTs and forces, without colours.
+    pub(super) fn log_cells(&self) -> Result<(), RecordError> {
+        let cells = self.cells.shape();
+        self.log_mesh(paths::PARTS, &cells)?;
+        self.log_mesh(paths::FORCE, &cells)
     }
 
     /// Logs data that never change, such as a style.

@@ -78,9 +78,9 @@ pub(super) fn log_pattern(recording: &OpenRecording, view: &PatternView<'_>) -> 
     RecordError::unless_per_vertex(view.flat.vertex_count(), &vertices)?;
     let Some(flat) = facing_the_eye(recording, view.flat) else { return Ok(()) };
     recording.at(view.index, 6);
-    let cells = CellMesh::new(&flat);
     let part = |&v: &u32| recording.vertex_colour.get(v as usize).copied().unwrap_or(CLOTH);
     let parts: Vec<_> = view.garment_vertex.iter().map(part).collect();
+    let cells = CellMesh::of_values(&flat, &parts);
     let panels = cells.shape().with_vertex_colors(rerun_colours(cells.of_vertices(&parts)));
     recording.log(&format!("{}/parts/panels", paths::PATTERN), &panels)?;
     let shape = meshes::whole(&flat);

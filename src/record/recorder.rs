@@ -17,6 +17,7 @@ use super::web::WebViewer;
 use super::wrinkles::{self, FoldView, WrinkleView};
 use super::{blueprint, meshes, paths, tabs};
 use crate::mesh::TriMesh;
+use crate::picture::colour::cells::CellMesh;
 use crate::picture::colour::map::Range;
 use crate::picture::colour::palette;
 
@@ -73,9 +74,10 @@ impl Recorder {
             recording.log_mesh(paths::GARMENT, &meshes::coloured(placed.clone(), palette::CLOTH))?;
             if recording.layout().method.is_none() && !recording.layout().table4 {
                 recording.log_mesh(paths::DISTANCE, &meshes::coloured(placed, [255; 3]))?;
-                let cells = recording.cells.shape();
-                recording.log_mesh(paths::PARTS, &cells)?;
-                recording.log_mesh(paths::FORCE, &cells)?;
+                if recording.layout().several_tables {
+                    recording.cells = CellMesh::new(garment);
+                    recording.log_cells()?;
+                }
             }
             recording.triangles_once(paths::DRAPE)?;
             recording.log_mesh(paths::DRAPE, &meshes::colours(palette::by_component(garment)))

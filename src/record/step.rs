@@ -96,6 +96,10 @@ fn log_distance(recording: &mut OpenRecording, step: &StepView<'_>) -> Result<()
 
 fn log_parts(recording: &mut OpenRecording, step: &StepView<'_>, tooltips: &[String]) -> Result<(), RecordError> {
     recording.at(step.index, 3);
+    if !recording.layout().several_tables && recording.first_use(paths::PARTS) {
+        recording.cells = CellMesh::of_values(&recording.garment, step.part_of_vertex);
+        recording.log_cells()?;
+    }
     let (parts, levels) = (step.part_force_n.len(), &step.panel.levels);
     let triangles = &recording.garment.triangles;
     let chosen = colour_parts(step.part_of_vertex, parts, levels, triangles, &recording.vertex_shade);
@@ -169,9 +173,11 @@ pub(super) fn log_outfit(recording: &OpenRecording, view: &OutfitView<'_>) -> Re
     for (k, layer) in recording.layout().outfit.iter().enumerate() {
         let branch = layer_branch(k, layer);
         let cut_out = |positions: &[DVec3]| layer.cut_out(&garment.triangles, positions);
-        let cells = CellMesh::new(&cut_out(&garment.positions));
+        let placed = cut_out(&garment.positions);
         let coloured = |of_vertex: &[Rgb]| -> Mesh3D {
-            cells.shape().with_vertex_colors(rerun_colours(cells.of_vertices(&of_vertex[layer.vertices.clone()])))
+            let own = &of_vertex[layer.vertices.clone()];
+            let cells = CellMesh::of_values(&placed, own);
+            cells.shape().with_vertex_colors(rerun_colours(cells.of_vertices(own)))
         };
         if recording.vertex_colour.len() == garment.positions.len() {
             recording.at(view.index, 3);

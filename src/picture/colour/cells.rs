@@ -7,9 +7,9 @@ use crate::mesh::{Csr, TriMesh};
 
 /// A garment divided into one cell per vertex, so that each vertex has its own colour up to a sharp border.
 ///
-/// Every triangle is split through its centroid and the midpoints of its sides into three quadrilaterals, one for each
+/// A triangle is split through its centroid and the midpoints of its sides into three quadrilaterals, one for each
 /// corner (the barycentric dual). A PART is a set of vertices; with colours per triangle, a PART of one vertex would be
-/// invisible.
+/// invisible. Where corners have the same value, nothing separates their cells.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CellMesh {
     /// The garment's vertex of each vertex of the cells, ascending.
@@ -21,18 +21,29 @@ pub(crate) struct CellMesh {
 }
 
 impl CellMesh {
-    /// Divides `garment` into cells.
+    /// Divides `garment` into cells, for any values of its vertices.
     pub(crate) fn new(garment: &TriMesh) -> Self {
+        Self::of_values(garment, &(0..garment.positions.len()).collect::<Vec<_>>())
+    }
+
+    /// Divides `garment` where these values of its vertices differ, for colours that differ there alone.
+    pub(crate) fn of_values<T: PartialEq>(garment: &TriMesh, of_vertex: &[T]) -> Self {
         // The key of a vertex of a cell: the owner itself (0), the midpoint towards another vertex, or a centroid.
         const MIDPOINT: u64 = 1;
         const CENTROID: u64 = 1 << 33;
-        let around = |v: u32, next: u32, previous: u32, t: u64| {
-            [MIDPOINT + u64::from(next), MIDPOINT + u64::from(previous), CENTROID + t].map(|key| (v, key))
+        let differ = |v: u32, w: u32| of_vertex[v as usize] != of_vertex[w as usize];
+        let divided = |[a, b, c]: [u32; 3]| differ(a, b) || differ(b, c);
+        let corners = |[a, b, c]: [u32; 3]| [(a, b, c), (b, c, a), (c, a, b)];
+        let of_corner = |(v, next, previous): (u32, u32, u32), t: u64| {
+            let towards = |w: u32| differ(v, w).then_some((v, MIDPOINT + u64::from(w)));
+            [towards(next), towards(previous), Some((v, CENTROID + t))]
         };
         let of_triangles = Csr::gathered(garment.positions.len(), || {
-            (0..).zip(&garment.triangles).flat_map(move |(t, &[a, b, c])| {
-                [around(a, b, c, t), around(b, c, a, t), around(c, a, b, t)].into_iter().flatten()
-            })
+            let to_divide = (0..).zip(&garment.triangles).filter(|(_, triangle)| divided(**triangle));
+            to_divide
+                .flat_map(|(t, triangle)| corners(*triangle).map(|corner| of_corner(corner, t)))
+                .flatten()
+                .flatten()
         });
         let mut keys = Csr::default();
         let mut own = Vec::new();
@@ -44,17 +55,23 @@ impl CellMesh {
             own.dedup();
             keys.push(own.iter().copied());
         }
-        let find = |(v, key): (u32, u64)| {
+        let find = |v: u32, key: u64| {
             (keys.range(v as usize).start + keys.of(v as usize).binary_search(&key).unwrap_or_default()) as u32
         };
-        let mut triangles = Vec::with_capacity(6 * garment.triangles.len());
-        for (t, &[a, b, c]) in garment.triangles.iter().enumerate() {
-            for (v, next, previous) in [(a, b, c), (b, c, a), (c, a, b)] {
-                let (corner, centre) = (find((v, 0)), find((v, CENTROID + t as u64)));
-                let ahead = find((v, MIDPOINT + u64::from(next)));
-                let behind = find((v, MIDPOINT + u64::from(previous)));
-                triangles.push([corner, ahead, centre]);
-                triangles.push([corner, centre, behind]);
+        let mut triangles = Vec::with_capacity(garment.triangles.len());
+        for (t, &triangle) in garment.triangles.iter().enumerate() {
+            if !divided(triangle) {
+                triangles.push(triangle.map(|v| find(v, 0)));
+                continue;
+            }
+            for (v, next, previous) in corners(triangle) {
+                let (corner, centre) = (find(v, 0), find(v, CENTROID + t as u64));
+                let midpoint = |w: u32| find(v, MIDPOINT + u64::from(w));
+                // Without a border both halves of a side go to its first corner.
+                triangles.push([corner, if differ(v, next) { midpoint(next) } else { find(next, 0) }, centre]);
+                if differ(v, previous) {
+                    triangles.push([corner, centre, midpoint(previous)]);
+                }
             }
         }
         let place = |values: &[DVec3]| -> Vec<DVec3> {
@@ -88,6 +105,7 @@ impl CellMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::samples::sheet;
 
     #[test]
     fn cells_tile_the_mesh_and_each_has_its_vertex_area() {
@@ -108,5 +126,27 @@ mod tests {
         // The winding is the same.
         let flat = |t: usize| cells.mesh.double_area_vector(t).normalize_or_zero();
         assert!(flat(0).dot(mesh.double_area_vector(0)) > 0.0);
+    }
+
+    #[test]
+    fn cells_of_equal_values_tile_the_mesh_with_borders_between_different_values_alone() {
+        let mesh = sheet(6, 6, |i, j| DVec3::new(i, 0.3 * j, j));
+        let values: Vec<bool> = mesh.positions.iter().map(|p| p.x < 2.5).collect();
+        let cells = CellMesh::of_values(&mesh, &values);
+        let areas = cells.mesh.triangle_areas();
+        assert!((areas.iter().sum::<f64>() - mesh.triangle_areas().iter().sum::<f64>()).abs() < 1e-12);
+        let mut area = [0.0; 2];
+        for (triangle, a) in cells.mesh.triangles.iter().zip(&areas) {
+            let [first, others @ ..] = triangle.map(|v| values[cells.owner[v as usize] as usize]);
+            assert_eq!(others, [first; 2]);
+            area[usize::from(first)] += a;
+        }
+        // Vertices of x = 2 and x = 3 share what is between them.
+        assert!((area[0] - area[1]).abs() < 1e-12, "{area:?}");
+        let all = CellMesh::new(&mesh);
+        assert!(cells.owner.len() < all.owner.len() / 2, "{} of {}", cells.owner.len(), all.owner.len());
+        // One value: the mesh itself.
+        let plain = CellMesh::of_values(&mesh, &[0; 49]);
+        assert_eq!((&plain.mesh.triangles, plain.mesh.positions), (&mesh.triangles, mesh.positions.clone()));
     }
 }
