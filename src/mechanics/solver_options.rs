@@ -68,8 +68,8 @@ options! {
         min_damping: f64 = 0.1,
         /// Factor on the damping after a short step; after a whole one it is divided by it.
         damping_factor: f64 = 2.0,
-        /// Share of its length below which a step is short. The damping of a tube of 4,000 vertices with slivers in denim grows to 500 times its
-        /// first value and stays there; it rests with 0.1, but a knotted ribbon does not. With 1e-5 two of 288 families do not rest.
+        /// Share of its length below which a step is short. With 0.1 a knotted ribbon does not rest, with 1e-5 two of 288 families did not
+        /// (28 November 2026).
         short_step: f64 = 0.3,
         /// Largest extrapolation of a step: see `newton::extrapolation`. With 2 ten garments of 1,000 to 5,500 vertices take 93 steps in knit and
         /// 248 in cotton, with 1 95 and 279.
@@ -86,7 +86,7 @@ options! {
         /// 5,500 vertices take 109 steps in knit and 326 in cotton with 60, 94 and 229 with 120 (and fewer projected steps), in less time; with 160 some fewer, in
         /// as much.
         trial_iterations: usize = 120,
-        /// Most trials of a line search that are relaxed. With trials of whole steps alone a cape of 60 vertices with slivers does not rest.
+        /// Most trials of a line search that are relaxed. With trials of whole steps alone two ponchos of two layers and 60 vertices do not rest.
         max_trials: usize = 2,
         /// Longest move of a vertex in one iteration, m: a fraction of a triangle.
         longest_move_m: f64 = 3e-3,
@@ -115,7 +115,7 @@ options! {
         return_share: f64 = 0.3,
         /// Least share of a step that is taken. With 1 one of 192 coarse garments (60 and 250 vertices) stalls, which one depends on other options.
         min_step_share: f64 = 0.125,
-        /// Least under-relaxation of gaps. With 1 two of 96 garments of 1,000 vertices do not rest.
+        /// Least under-relaxation of gaps. With 1 two of 192 garments of 60 and 250 vertices do not rest.
         min_under_relaxation: f64 = 1.0 / 64.0,
     }
 
@@ -139,8 +139,6 @@ options! {
         max_offset_raise_m: f64 = 4e-3,
         /// Least offset of a place, m: the amount by which the body rises between two places of a lattice.
         min_offset_m: f64 = 6e-4,
-        /// Most places that are added to a triangle at a time. With 1000 a poncho of 60 vertices with slivers does not rest.
-        max_new_places: usize = 6,
         /// Updates without fewer intersections after which the intersecting triangles are released. Without it two patterns that are strained
         /// by over 100 % end after 365 and 585 steps for 214 and 156. With 3 a sheet over a cube ends with skin through cloth in five pairs.
         max_idle_updates: usize = 4,

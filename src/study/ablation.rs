@@ -57,7 +57,6 @@ const OFF: &[(&str, f64)] = &[
     ("face_contact.max_residual", 0.0),
     ("face_contact.max_steps", 1e5),
     ("face_contact.max_offset_raise_m", 0.0),
-    ("face_contact.max_new_places", 0.0),
     ("face_contact.max_idle_updates", 1e5),
     ("self_contact.neighbour_share", 0.0),
     ("self_contact.stiffening", 1.0),

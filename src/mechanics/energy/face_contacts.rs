@@ -220,7 +220,7 @@ impl FaceContacts {
         each.map(|triangle| self.add(triangle, body, x, within)).sum()
     }
 
-    /// Adds the points of a triangle that are deepest in the body, and its nearest one if that is less than `within` (m) beyond its offset; returns
+    /// Adds the points of a triangle that are in the body, and its nearest one if that is less than `within` (m) beyond its offset; returns
     /// how many.
     fn add(&mut self, triangle: &Triangle, body: &Body, x: &[DVec3], within: f64) -> usize {
         let corners = triangle.vertices;
@@ -228,9 +228,8 @@ impl FaceContacts {
         let present: Vec<Place> = self.places.iter().filter(|p| p.corners == corners).copied().collect();
         let mut added = 0;
         for (distance, place) in self.lattice_of(triangle, body, x) {
-            let first = added == 0 && distance < offset + within;
-            let wanted = first || distance < 0.0;
-            if !wanted || added == self.options.max_new_places {
+            let is_nearest = added == 0 && distance < offset + within;
+            if distance >= 0.0 && !is_nearest {
                 break;
             }
             if present.iter().all(|p| p.shares != place.shares) {

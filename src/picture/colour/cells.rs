@@ -141,8 +141,8 @@ mod tests {
             assert_eq!(others, [first; 2]);
             area[usize::from(first)] += a;
         }
-        // Vertices of x = 2 and x = 3 share what is between them.
-        assert!((area[0] - area[1]).abs() < 1e-12, "{area:?}");
+        // The border is half-way between x = 2 and x = 3, of 6.
+        assert!((3.5 * area[1] - 2.5 * area[0]).abs() < 1e-12, "{area:?}");
         let all = CellMesh::new(&mesh);
         assert!(cells.owner.len() < all.owner.len() / 2, "{} of {}", cells.owner.len(), all.owner.len());
         // One value: the mesh itself.
