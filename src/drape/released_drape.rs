@@ -15,16 +15,13 @@ use glam::DVec3;
 use super::distances::Distances;
 use super::error::DrapeError;
 use super::levels::{Levels, cloth_of};
-use super::release::Release;
+use super::release::{MAX_SINK_M, Release};
 use super::settings::{Refine, Settings};
 use super::stages::{StartsFrom, refine_from};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::newton::SolveError;
 use crate::mechanics::refine::{self, Observer, Record, RefineOptions, Refined, Step, Stop};
 use crate::scene::Scene;
-
-/// A waist that sinks farther than this slides, m: from the waist to the hips it is twice as far.
-const MAX_SINK_M: f64 = 0.1;
 
 /// Residual over weight below which the edges of a garment without coarser cloth are released. An asymmetric circle skirt in cotton (15,493 vertices)
 /// took 111 steps where it first rested held, and 50, 35 and 41 if released at 0.01, 0.03 and 0.1, before it began released.
