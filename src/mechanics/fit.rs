@@ -10,8 +10,9 @@
 //! | ε | largest principal strain | % in results, – inside |
 //! | p | contact pressure | kPa |
 //!
-//! Limits: slivers are left out, since their height at rest is not that of the cloth (`energy::membrane`); wrinkles finer than an edge are not resolved, and the negative strain across a fold is not reported. The pressure is that of the
-//! penalty at rest; it is smooth over about one edge.
+//! Limits: slivers are left out, since their height at rest is not that of the cloth (`energy::membrane`). Wrinkles finer than an edge are not
+//! resolved, and the negative strain across a fold is not reported. The pressure is that of the penalty at rest; it is smooth over about one
+//! edge.
 
 use glam::DVec3;
 
