@@ -19,7 +19,8 @@ const TITLE_HEIGHT: f64 = 0.036;
 /// The contents of a recording beyond the stages of one drape; each of them gets its views only if it is present.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Layout {
-    /// Several steps of the timeline `table`: numbers are plotted over it.
+    /// Several steps of the timeline `table`, whose PARTs differ: numbers are plotted over it, and every triangle is divided into cells. Without it,
+    /// those at the borders of the first PARTs are.
     pub several_tables: bool,
     /// The number of those steps, if known: plots then leave room for their legends.
     pub table_count: Option<u32>,
