@@ -15,13 +15,16 @@ use glam::DVec3;
 use super::distances::Distances;
 use super::error::DrapeError;
 use super::levels::{Levels, cloth_of};
-use super::release::{MAX_SINK_M, Release};
+use super::release::Release;
 use super::settings::{Refine, Settings};
 use super::stages::{StartsFrom, refine_from};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::newton::SolveError;
 use crate::mechanics::refine::{self, Observer, Record, RefineOptions, Refined, Step, Stop};
 use crate::scene::Scene;
+
+/// A waist that sinks farther than this slides, m: from the waist to the hips it is twice as far.
+const MAX_SINK_M: f64 = 0.1;
 
 /// Residual over weight below which the edges of a garment without coarser cloth are released. An asymmetric circle skirt in cotton (15,493 vertices)
 /// took 111 steps where it first rested held, and 50, 35 and 41 if released at 0.01, 0.03 and 0.1, before it began released.
@@ -110,7 +113,9 @@ pub(crate) fn settle_and_release(
     let rested = settle((held_positions, from), None, &mut |step: &Step<'_>| {
         observer(&Step { iteration: steps_before + step.iteration, ..*step })
     })?;
-    held_drape(after_all(rested), Some(Release::Slides { sank_m, is_coarse: false }))
+    let release =
+        if sank_m > MAX_SINK_M { Release::Slides { sank_m, is_coarse: false } } else { Release::Unsettled { sank_m } };
+    held_drape(after_all(rested), Some(release))
 }
 
 /// Options of the steps after a release.

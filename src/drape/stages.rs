@@ -104,8 +104,8 @@ impl StageResults {
             Some((positions, state)) => (positions, Some(state)),
         };
         warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
-        if let Some(slides @ Release::Slides { .. }) = &release {
-            warnings.push(format!("the garment {slides}"));
+        if let Some(held @ (Release::Slides { .. } | Release::Unsettled { .. })) = &release {
+            warnings.push(format!("the garment {held}"));
         }
         warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)));
         // PARTs alone may shorten cloth that still unfolds.

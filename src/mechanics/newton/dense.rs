@@ -18,8 +18,8 @@ const NARROW: usize = 16;
 const PRODUCTS_PER_TASK: usize = 1 << 20;
 
 /// Share of the diagonal entry of its column below which a pivot is rounding: 512 units of single precision. A pivot is what is left of that
-/// entry after some hundred to thousand subtractions, each of which rounds, and small pivots before it amplify the rounding. Evidence:
-/// decision 22.
+/// entry after some hundred to thousand subtractions, each of which rounds, and small pivots before it amplify the rounding. A smaller limit keeps
+/// pivots of rounding, and steps may be infinite; a larger one replaces pivots of soft directions. Evidence: decision 22.
 const LOST_PIVOT: f32 = 512.0 * f32::EPSILON;
 
 /// Registers of rows, and columns, of a tile of a product.
