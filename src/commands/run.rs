@@ -4,7 +4,7 @@ mod method;
 mod poses;
 mod watch;
 
-use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use crate::Job;
 use crate::base::files::has_ending;
 use crate::drape::{self, Drape, Refine, Release};
 use crate::mechanics::methods::METHODS;
-use crate::mechanics::refine::{Observer, Step};
+use crate::mechanics::refine::Observer;
 use crate::picture::Quantity;
 use crate::picture::colour::of_drape;
 use crate::record::Recorder;
@@ -28,7 +28,7 @@ use super::inputs::InputArgs;
 use super::pictures::PictureArgs;
 use super::runtime::{interrupted, reference_cache, refuse, use_threads, wait_for_interrupt, with_progress};
 use super::sinks::{SinkArgs, mesh_file};
-use super::solved::{Iteration, Solved, folded_preview};
+use super::solved::{IterationLog, Solved, begin, folded_preview};
 use super::stages::StageArgs;
 use super::summary::{Summary, print_certificate, require_pass};
 
@@ -109,23 +109,23 @@ pub(crate) struct RunArgs {
 struct Origin {
     /// Time spent loading.
     load: Duration,
-    /// States of the solver by iteration.
-    iterations: BTreeMap<usize, Iteration>,
+    /// Recorded iterations of the solver.
+    iterations: i64,
 }
 
-/// Prints the address of a served recording, and ends the recording after Ctrl-C.
+/// Serves a recording until Ctrl-C, and ends it.
 fn serve(recorder: Recorder) -> anyhow::Result<()> {
-    if let Some(url) = recorder.web_url() {
-        console::note(&format!("view it in a browser: {url}"));
-    }
     wait_for_interrupt();
     console::notes(recorder.finish()?.file_line().as_slice());
     Ok(())
 }
 
-/// Interval, in solver iterations, at which the mesh is recorded. A smaller interval gives a smoother animation and a larger file; this
-/// one, a heuristic, keeps a recording at a few megabytes.
-const MESH_INTERVAL: usize = 8;
+/// Prints the address of a recording, if it is served.
+fn print_address(recorder: &Recorder) {
+    if let Some(url) = recorder.web_url() {
+        console::note(&format!("view it in a browser: {url}"));
+    }
+}
 
 impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
@@ -158,9 +158,15 @@ impl RunArgs {
             );
         }
         self.sinks.refuse_unwritable(&job.scene.garment_name())?;
-        let mut solved = self.solve(job, start)?;
-        let mut recorder = solved.open(&self.sinks, !self.no_iterations, false)?;
-        solved.record(&mut recorder, 0, !self.no_iterations)?;
+        let loaded = self.load(&job)?;
+        let load = start.elapsed();
+        let (mut recorder, begun) = begin(&self.sinks, &job, &loaded, !self.no_iterations)?;
+        print_address(&recorder);
+        let iterations = Some(&mut recorder).filter(|_| !self.no_iterations && job.settings.refine != Refine::Steps(0));
+        let mut solved = self.solve(job, loaded, load, IterationLog::new(iterations))?;
+        solved.summary.add_time("record", begun);
+        recorder.set_layout(solved.layout())?;
+        solved.record(&mut recorder, 0)?;
         self.export(&mut solved)?;
         self.draw(&mut solved)?;
         if self.sinks.serve {
@@ -253,26 +259,24 @@ impl RunArgs {
         Ok(Job { scene, settings, seed: 0, accuracy, spread_starts: self.spread })
     }
 
-    /// Runs every stage of a job.
-    fn solve(&self, mut job: Job, start: Instant) -> anyhow::Result<Solved> {
+    /// Body and garment of a job.
+    fn load(&self, job: &Job) -> anyhow::Result<Loaded> {
         let loaded = self.input.load(&job.scene)?;
         self.stages.model.fabric.check_used(&loaded)?;
-        let load = start.elapsed();
-        let name = &loaded.garment_name;
-        let mut iterations = BTreeMap::new();
-        let drape = with_progress(name, |progress| {
+        Ok(loaded)
+    }
+
+    /// Runs every stage of a job.
+    fn solve(&self, mut job: Job, loaded: Loaded, load: Duration, mut log: IterationLog<'_>) -> anyhow::Result<Solved> {
+        let mut logged = Ok(());
+        let drape = with_progress(&loaded.garment_name, |progress| {
             job.drape(&loaded.scene, &mut |step| {
-                if step.at_rest {
-                    // The same state was reported before, as an iteration.
-                    return progress(step);
-                }
-                let positions = (step.iteration.is_multiple_of(MESH_INTERVAL)).then(|| step.positions.to_vec());
-                let Step { energy, residual_over_weight, .. } = *step;
-                // Solves on coarser garments and rejected trials are replaced by the iteration that follows.
-                iterations.insert(step.iteration, Iteration { energy, residual_over_weight, positions });
-                progress(step)
+                logged = log.add(step);
+                if logged.is_err() { ControlFlow::Break(()) } else { progress(step) }
             })
         })?;
+        logged?;
+        let iterations = log.finish()?;
         self.measured(&mut job, loaded, drape, Origin { load, iterations })
     }
 

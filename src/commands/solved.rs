@@ -1,12 +1,12 @@
 //! A garment after every stage, and its recording: one step of the timeline with all stages, fit and folds, and the iterations of the
-//! solver; and the recording of a session, one step for each finished state.
+//! solver as they come; and the recording of a session, one step for each finished state.
 
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use crate::Job;
-use crate::drape::{Drape, Refine, unobserved};
+use crate::drape::{Drape, Model, Refine, unobserved};
 use crate::mechanics::folded_surface::FoldedSurface;
+use crate::mechanics::refine::Step;
 use crate::record::{
     FoldView, Layout, OutfitView, Overlay, PatternView, RecordError, RecordOptions, RecordSummary, Recorder, StepView,
     Tab, WrinkleView,
@@ -27,18 +27,115 @@ pub(super) struct Solved {
     pub(super) measured: Measured,
     /// The preview with its folds, where it is the result.
     pub(super) folded: Option<FoldedSurface>,
-    /// States of the solver by iteration.
-    pub(super) iterations: BTreeMap<usize, Iteration>,
+    /// Recorded iterations of the solver.
+    pub(super) iterations: i64,
     pub(super) summary: Summary,
 }
 
+/// Interval, in solver iterations, at which the mesh is recorded. A smaller interval gives a smoother animation and a larger file; this
+/// one, a heuristic, keeps a recording at a few megabytes.
+const MESH_INTERVAL: i64 = 8;
+
+/// Records the iterations of the solver as they come. Solves on coarser garments and rejected trials are replaced by the iteration that follows.
+/// A second solve, as of a garment that has slid once released, continues the numbers of the first.
+pub(super) struct IterationLog<'r> {
+    recorder: Option<&'r mut Recorder>,
+    /// The last iteration, which is not recorded yet, and its number.
+    last: Option<Iteration>,
+    number: i64,
+}
+
 /// The cloth at one iteration of the solver.
-pub(super) struct Iteration {
+struct Iteration {
+    /// As the solver counts.
+    iteration: usize,
     /// J.
-    pub(super) energy: f64,
-    pub(super) residual_over_weight: f64,
+    energy: f64,
+    residual_over_weight: f64,
     /// Positions, m; present in some iterations only.
-    pub(super) positions: Option<Vec<DVec3>>,
+    positions: Option<Vec<DVec3>>,
+}
+
+impl<'r> IterationLog<'r> {
+    /// Records to `recorder`, if there is one.
+    pub(super) fn new(recorder: Option<&'r mut Recorder>) -> Self {
+        Self { recorder, last: None, number: 0 }
+    }
+
+    /// Adds a state of the solver.
+    pub(super) fn add(&mut self, step: &Step<'_>) -> Result<(), RecordError> {
+        // A state at rest was reported before, as an iteration.
+        if self.recorder.is_none() || step.at_rest {
+            return Ok(());
+        }
+        if self.last.as_ref().is_some_and(|last| last.iteration != step.iteration) {
+            self.send()?;
+        }
+        let Step { iteration, energy, residual_over_weight, .. } = *step;
+        let positions = (self.number % MESH_INTERVAL == 0).then(|| step.positions.to_vec());
+        self.last = Some(Iteration { iteration, energy, residual_over_weight, positions });
+        Ok(())
+    }
+
+    /// Records the last iteration; returns how many there are.
+    pub(super) fn finish(mut self) -> Result<i64, RecordError> {
+        self.send()?;
+        Ok(self.number)
+    }
+
+    fn send(&mut self) -> Result<(), RecordError> {
+        let (Some(recorder), Some(last)) = (&mut self.recorder, self.last.take()) else { return Ok(()) };
+        let Iteration { energy, residual_over_weight, positions, .. } = last;
+        recorder.iteration(self.number, energy, residual_over_weight, positions.as_deref())?;
+        self.number += 1;
+        Ok(())
+    }
+}
+
+/// Opens the recording of a garment that is still to be draped, and records body and garment.
+pub(super) fn begin(
+    sinks: &SinkArgs,
+    job: &Job,
+    loaded: &Loaded,
+    iterations: bool,
+) -> Result<(Recorder, Duration), RecordError> {
+    let began = Instant::now();
+    let (is_coupled, is_refined) =
+        (matches!(job.settings.model, Model::Coupled(_)), job.settings.refine != Refine::Steps(0));
+    let fit = [("strain", is_coupled || is_refined), ("pressure", is_coupled || is_refined), ("folds", is_coupled)];
+    let layout = Layout {
+        iterations: iterations && is_refined,
+        fit: fit.iter().filter(|(_, expected)| *expected).map(|(name, _)| (*name).to_owned()).collect(),
+        ..layout_of(loaded, !matches!(job.accuracy, Against::None))
+    };
+    let mut recorder = open(sinks, loaded, layout, false)?;
+    recorder.body(0, loaded.scene.body.mesh())?;
+    recorder.garment(0, &loaded.scene.garment)?;
+    Ok((recorder, began.elapsed()))
+}
+
+fn open(sinks: &SinkArgs, loaded: &Loaded, layout: Layout, live: bool) -> Result<Recorder, RecordError> {
+    Recorder::open(RecordOptions {
+        sinks: sinks.sinks(&loaded.garment_name),
+        name: loaded.garment_name.clone(),
+        layout,
+        replaceable: live,
+        front: sinks.seen_from.direction(),
+    })
+}
+
+/// The layout of a garment's recording, without fit and iterations.
+fn layout_of(loaded: &Loaded, error: bool) -> Layout {
+    let layers = &loaded.scene.layers;
+    let layered = layers.len() > 1;
+    Layout {
+        error,
+        pattern: loaded.tailored.is_some(),
+        outfit: if layered { layers.clone() } else { Vec::new() },
+        wrinkles: error,
+        opens_on: if layered { Tab::Outfit } else { Tab::Stages },
+        ..Layout::default()
+    }
 }
 
 /// The preview with its folds, where the job ends with the preview.
@@ -55,33 +152,23 @@ impl Solved {
         let folded = folded_preview(&loaded, job, &drape);
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
         summary.add_time("load", Duration::from_secs_f64(1e-3 * finished.loaded_scene.load_ms));
-        Ok(Self { loaded, drape, measured, folded, iterations: BTreeMap::new(), summary })
+        Ok(Self { loaded, drape, measured, folded, iterations: 0, summary })
     }
 
-    /// Opens a recording of this garment. With `live`, further steps follow, whose meshes may differ.
-    pub(super) fn open(&self, sinks: &SinkArgs, iterations: bool, live: bool) -> Result<Recorder, RecordError> {
-        let overlays = self.overlays();
-        let layers = &self.loaded.scene.layers;
-        let layered = layers.len() > 1;
-        let fit = overlays.iter().map(|overlay| overlay.name).filter(|name| *name != "error");
-        Recorder::open(RecordOptions {
-            sinks: sinks.sinks(&self.loaded.garment_name),
-            name: self.loaded.garment_name.clone(),
-            layout: Layout {
-                several_tables: live,
-                follow: live,
-                iterations: iterations && self.iterations.len() > 1,
-                error: self.measured.evaluation.is_some(),
-                pattern: self.loaded.tailored.is_some(),
-                outfit: if layered { layers.clone() } else { Vec::new() },
-                wrinkles: self.measured.evaluation.is_some(),
-                fit: fit.map(str::to_owned).collect(),
-                opens_on: if layered { Tab::Outfit } else { Tab::Stages },
-                ..Layout::default()
-            },
-            replaceable: live,
-            front: sinks.seen_from.direction(),
-        })
+    /// Opens a recording of this garment. Further steps follow, whose meshes may differ.
+    pub(super) fn open(&self, sinks: &SinkArgs) -> Result<Recorder, RecordError> {
+        let layout = Layout { several_tables: true, follow: true, iterations: false, ..self.layout() };
+        open(sinks, &self.loaded, layout, true)
+    }
+
+    /// The layout of its recording.
+    pub(super) fn layout(&self) -> Layout {
+        let fit = self.overlays().into_iter().map(|overlay| overlay.name).filter(|name| *name != "error");
+        Layout {
+            iterations: self.iterations > 1,
+            fit: fit.map(str::to_owned).collect(),
+            ..layout_of(&self.loaded, self.measured.evaluation.is_some())
+        }
     }
 
     /// Values per vertex shown on the draped garment: strain, pressure, folds, and the error if it was measured.
@@ -101,8 +188,8 @@ impl Solved {
         overlays
     }
 
-    /// Logs step `index`, with the iterations of the solver if `iterations` is set.
-    pub(super) fn record(&mut self, recorder: &mut Recorder, index: i64, iterations: bool) -> anyhow::Result<()> {
+    /// Logs step `index`.
+    pub(super) fn record(&mut self, recorder: &mut Recorder, index: i64) -> anyhow::Result<()> {
         let start = Instant::now();
         let Self { loaded, drape, measured, summary, .. } = &*self;
         let scene = &loaded.scene;
@@ -149,13 +236,6 @@ impl Solved {
             });
             let (jumps_mm, curvature_per_m) = (&jumps.collect::<Vec<_>>(), &evaluation.wrinkles.vertex_curvature_per_m);
             recorder.wrinkles(&WrinkleView { index, draped, jumps_mm, curvature_per_m })?;
-        }
-        if iterations {
-            for (iteration, state) in &self.iterations {
-                let iteration = i64::try_from(*iteration).unwrap_or(i64::MAX);
-                let Iteration { energy, residual_over_weight, positions } = state;
-                recorder.iteration(iteration, *energy, *residual_over_weight, positions.as_deref())?;
-            }
         }
         self.summary.add_time("record", start.elapsed());
         Ok(())
@@ -230,9 +310,9 @@ fn follow(session: &Session, sinks: &SinkArgs, connected: &mut dyn FnMut()) -> a
         let mut solved = Solved::of_session(&job, finished, measured)?;
         let recorder = match &mut recorder {
             Some(recorder) => recorder,
-            none => none.insert(solved.open(sinks, false, true)?),
+            none => none.insert(solved.open(sinks)?),
         };
-        solved.record(recorder, index, false)?;
+        solved.record(recorder, index)?;
         if index == 0 {
             connected();
         }

@@ -11,10 +11,9 @@ use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder
 use super::error::RecordError;
 use super::eye::Eye;
 use super::layout::{ASPECT, Layout};
-use super::meshes;
-use super::paths;
 use super::sinks::{OpenSinks, Sink, Target};
 use super::web::WebViewer;
+use super::{blueprint, meshes, paths, tabs};
 use crate::mesh::TriMesh;
 use crate::picture::colour::cells::CellMesh;
 use crate::picture::colour::map::{Range, Rgb};
@@ -127,6 +126,12 @@ impl OpenRecording {
 
     pub(super) fn layout(&self) -> &Layout {
         &self.options.layout
+    }
+
+    /// Sends the layout.
+    pub(super) fn send_views(&self) -> Result<(), RecordError> {
+        let layout = self.layout();
+        blueprint::send(&self.stream, &tabs::root(layout, &self.eye), tabs::time_panel(layout))
     }
 
     /// The range of a quantity's colour map. It is set once, by the first step or before it, so that colours are comparable

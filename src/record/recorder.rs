@@ -8,6 +8,7 @@ use rerun::{Scalars, TextDocument};
 use super::charts::log_scalar;
 use super::compare::{self, Compared};
 use super::error::RecordError;
+use super::layout::Layout;
 use super::method::{self, MethodView};
 use super::open_recording::{OpenRecording, RecordOptions, RecordSummary};
 use super::overlay::{self, PatternView};
@@ -15,7 +16,7 @@ use super::scatter::{self, Picture, ScatterPoint};
 use super::step::{self, OutfitView, StepView};
 use super::web::WebViewer;
 use super::wrinkles::{self, FoldView, WrinkleView};
-use super::{blueprint, meshes, paths, tabs};
+use super::{meshes, paths};
 use crate::mesh::TriMesh;
 use crate::picture::colour::cells::CellMesh;
 use crate::picture::colour::map::Range;
@@ -64,9 +65,8 @@ impl Recorder {
                 return Ok(());
             }
             recording.set_garment(garment);
-            let layout = recording.layout();
             if !recording.views_sent && !garment.positions.is_empty() {
-                blueprint::send(&recording.stream, &tabs::root(layout, &recording.eye), tabs::time_panel(layout))?;
+                recording.send_views()?;
                 recording.views_sent = true;
             }
             recording.at(index, 1);
@@ -81,6 +81,17 @@ impl Recorder {
             }
             recording.triangles_once(paths::DRAPE)?;
             recording.log_mesh(paths::DRAPE, &meshes::colours(palette::by_component(garment)))
+        })
+    }
+
+    /// Replaces the layout, and sends it where it differs from the one before.
+    pub(crate) fn set_layout(&mut self, layout: Layout) -> Result<(), RecordError> {
+        self.timed(|recording| {
+            if *recording.layout() == layout {
+                return Ok(());
+            }
+            recording.options.layout = layout;
+            if recording.views_sent { recording.send_views() } else { Ok(()) }
         })
     }
 

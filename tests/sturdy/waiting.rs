@@ -140,6 +140,22 @@ fn ctrl_c_while_a_mesh_is_made_ends_the_run_at_once() {
 }
 
 #[test]
+fn a_served_recording_is_open_before_the_garment_is_at_rest() {
+    let bench = Bench::new();
+    let results = bench.path("results");
+    let mut command = bench.command();
+    command.args(["--no-save", "--serve", "--port", "0", "--garment", "flared-skirt@6000"]).stderr(Stdio::piped());
+    let mut child = command.stdout(std::fs::File::create(&results).unwrap()).spawn().unwrap();
+    let messages = std::io::BufRead::lines(std::io::BufReader::new(child.stderr.take().unwrap()));
+    let address = messages.map_while(Result::ok).find(|line| line.contains("view it in a browser"));
+    let printed = std::fs::metadata(&results).unwrap().len();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(address.is_some());
+    assert_eq!(printed, 0, "the results are printed at rest");
+}
+
+#[test]
 fn whoever_is_ended_at_once_leaves_nothing_half_written() {
     let bench = Bench::new();
     // Its recording waits for a viewer that does not read, and its file with it.

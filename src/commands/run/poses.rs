@@ -6,10 +6,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::{Origin, RunArgs, TWO_STAGE, serve};
+use super::{Origin, RunArgs, TWO_STAGE, print_address, serve};
 use crate::base::files::stem;
 use crate::commands::console::{self, Format};
 use crate::commands::runtime::{interrupted, refuse, with_progress};
+use crate::commands::solved::IterationLog;
 use crate::commands::summary::{Summary, print_certificate, require_pass};
 use crate::drape::{Model, next_pose};
 use crate::scene::{PoseReader, pose_files};
@@ -73,12 +74,14 @@ impl RunArgs {
         for file in &files {
             reader.read(file)?;
         }
-        let solved = self.solve(job.clone(), start)?;
-        let mut recorder = solved.open(&self.sinks, false, true)?;
+        let loaded = self.load(&job)?;
+        let solved = self.solve(job.clone(), loaded, start.elapsed(), IterationLog::new(None))?;
+        let mut recorder = solved.open(&self.sinks)?;
+        print_address(&recorder);
         let rest_ms = 1e3 * solved.drape.times.total.as_secs_f64();
         let mut poses = vec![Pose { preview_ms: 0.0, preview_rms_mm: 0.0, rest_ms, summary: solved.summary.clone() }];
         let mut all = vec![solved];
-        all[0].record(&mut recorder, 0, false)?;
+        all[0].record(&mut recorder, 0)?;
         for (index, file) in (1..).zip(&files) {
             if interrupted() {
                 break;
@@ -95,10 +98,10 @@ impl RunArgs {
             let drape = with_progress(&title, |progress| next_pose(last, &loaded.scene, &job.settings, progress))?;
             let rest = drape.times.total;
             let preview_rms_mm = rms_mm(&drape.preview, &drape.positions);
-            let origin = Origin { load: Duration::ZERO, iterations: Default::default() };
+            let origin = Origin { load: Duration::ZERO, iterations: 0 };
             let mut solved = self.measured(&mut job, loaded, drape, origin)?;
             solved.summary.add_time("carry", preview);
-            solved.record(&mut recorder, index, false)?;
+            solved.record(&mut recorder, index)?;
             let [preview_ms, rest_ms] = [preview, rest].map(|time| 1e3 * time.as_secs_f64());
             poses.push(Pose { preview_ms, preview_rms_mm, rest_ms, summary: solved.summary.clone() });
             // Without a picture only the last pose is needed.

@@ -124,9 +124,9 @@ impl RunArgs {
         progress.last = Some(Arc::clone(finished));
         let recorder = match &mut progress.recorder {
             Some(recorder) => recorder,
-            none => none.insert(solved.open(&self.sinks, false, true)?),
+            none => none.insert(solved.open(&self.sinks)?),
         };
-        solved.record(recorder, progress.index, false)?;
+        solved.record(recorder, progress.index)?;
         if progress.index == 0 {
             self.export(&mut solved)?;
         }
