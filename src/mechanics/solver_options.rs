@@ -111,7 +111,7 @@ options! {
         max_residual: f64 = 0.3,
         /// Steps without progress that may count as a cycle. Halved, doubled: 556, 545 steps.
         window: usize = 12,
-        /// They do if the energy changed by less than this share of what it went up and down. Halved or doubled: the same steps.
+        /// They do if the energy changed by less than this share of what it went up and down. Without this condition one of 68 drapes does not rest.
         return_share: f64 = 0.3,
         /// Least share of a step that is taken. With 1 one of 192 coarse garments (60 and 250 vertices) stalls, which one depends on other options.
         min_step_share: f64 = 0.125,
