@@ -160,11 +160,12 @@ impl RunArgs {
         self.sinks.refuse_unwritable(&job.scene.garment_name())?;
         let loaded = self.load(&job)?;
         let load = start.elapsed();
-        let (mut recorder, begun) = begin(&self.sinks, &job, &loaded, !self.no_iterations)?;
+        let iterations = !self.no_iterations && job.settings.refine != Refine::Steps(0);
+        let (mut recorder, recorded) = begin(&self.sinks, &job, &loaded, iterations)?;
         print_address(&recorder);
-        let iterations = Some(&mut recorder).filter(|_| !self.no_iterations && job.settings.refine != Refine::Steps(0));
-        let mut solved = self.solve(job, loaded, load, IterationLog::new(iterations))?;
-        solved.summary.add_time("record", begun);
+        let log = IterationLog::new(Some(&mut recorder).filter(|_| iterations));
+        let mut solved = self.solve(job, loaded, load, log)?;
+        solved.summary.add_time("record", recorded);
         recorder.set_layout(solved.layout())?;
         solved.record(&mut recorder, 0)?;
         self.export(&mut solved)?;
@@ -271,7 +272,10 @@ impl RunArgs {
         let mut logged = Ok(());
         let drape = with_progress(&loaded.garment_name, |progress| {
             job.drape(&loaded.scene, &mut |step| {
-                logged = log.add(step);
+                // The solver may report states after a break, and the first error counts.
+                if logged.is_ok() {
+                    logged = log.add(step);
+                }
                 if logged.is_err() { ControlFlow::Break(()) } else { progress(step) }
             })
         })?;

@@ -92,7 +92,8 @@ impl<'r> IterationLog<'r> {
     }
 }
 
-/// Opens the recording of a garment that is still to be draped, and records body and garment.
+/// Opens the recording of a garment that is still to be draped, with the layout that its job lets expect, and records body and garment; the time
+/// that this took.
 pub(super) fn begin(
     sinks: &SinkArgs,
     job: &Job,
@@ -100,12 +101,15 @@ pub(super) fn begin(
     iterations: bool,
 ) -> Result<(Recorder, Duration), RecordError> {
     let began = Instant::now();
-    let (is_coupled, is_refined) =
-        (matches!(job.settings.model, Model::Coupled(_)), job.settings.refine != Refine::Steps(0));
-    let fit = [("strain", is_coupled || is_refined), ("pressure", is_coupled || is_refined), ("folds", is_coupled)];
+    let is_coupled = matches!(job.settings.model, Model::Coupled(_));
+    let fit: &[&str] = match job.settings.refine {
+        _ if is_coupled => &["strain", "pressure", "folds"],
+        Refine::Steps(0) => &[],
+        _ => &["strain", "pressure"],
+    };
     let layout = Layout {
-        iterations: iterations && is_refined,
-        fit: fit.iter().filter(|(_, expected)| *expected).map(|(name, _)| (*name).to_owned()).collect(),
+        iterations,
+        fit: fit.iter().map(|name| (*name).to_owned()).collect(),
         ..layout_of(loaded, !matches!(job.accuracy, Against::None))
     };
     let mut recorder = open(sinks, loaded, layout, false)?;
