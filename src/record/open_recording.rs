@@ -13,7 +13,7 @@ use super::eye::Eye;
 use super::layout::{ASPECT, Layout};
 use super::sinks::{OpenSinks, Sink, Target};
 use super::web::WebViewer;
-use super::{blueprint, meshes, paths, tabs};
+use super::{meshes, paths};
 use crate::mesh::TriMesh;
 use crate::picture::colour::cells::CellMesh;
 use crate::picture::colour::map::{Range, Rgb};
@@ -126,12 +126,6 @@ impl OpenRecording {
 
     pub(super) fn layout(&self) -> &Layout {
         &self.options.layout
-    }
-
-    /// Sends the layout.
-    pub(super) fn send_views(&self) -> Result<(), RecordError> {
-        let layout = self.layout();
-        blueprint::send(&self.stream, &tabs::root(layout, &self.eye), tabs::time_panel(layout))
     }
 
     /// The range of a quantity's colour map. It is set once, by the first step or before it, so that colours are comparable

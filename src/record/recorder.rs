@@ -16,7 +16,7 @@ use super::scatter::{self, Picture, ScatterPoint};
 use super::step::{self, OutfitView, StepView};
 use super::web::WebViewer;
 use super::wrinkles::{self, FoldView, WrinkleView};
-use super::{meshes, paths};
+use super::{blueprint, meshes, paths, tabs};
 use crate::mesh::TriMesh;
 use crate::picture::colour::cells::CellMesh;
 use crate::picture::colour::map::Range;
@@ -66,7 +66,7 @@ impl Recorder {
             }
             recording.set_garment(garment);
             if !recording.views_sent && !garment.positions.is_empty() {
-                recording.send_views()?;
+                send_views(recording)?;
                 recording.views_sent = true;
             }
             recording.at(index, 1);
@@ -91,7 +91,7 @@ impl Recorder {
                 return Ok(());
             }
             recording.options.layout = layout;
-            if recording.views_sent { recording.send_views() } else { Ok(()) }
+            if recording.views_sent { send_views(recording) } else { Ok(()) }
         })
     }
 
@@ -223,6 +223,12 @@ impl Recorder {
         recording.spent += started.elapsed();
         result
     }
+}
+
+/// Sends the layout of a recording.
+fn send_views(recording: &OpenRecording) -> Result<(), RecordError> {
+    let layout = recording.layout();
+    blueprint::send(&recording.stream, &tabs::root(layout, &recording.eye), tabs::time_panel(layout))
 }
 
 impl Drop for Recorder {
