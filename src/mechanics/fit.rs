@@ -10,8 +10,8 @@
 //! | ε | largest principal strain | % in results, – inside |
 //! | p | contact pressure | kPa |
 //!
-//! Limits: slivers are left out, since their height at rest is not that of the cloth (`energy::membrane`). Wrinkles finer than an edge are not
-//! resolved, and the negative strain across a fold is not reported. The pressure is that of the penalty at rest; it is smooth over about one
+//! Limits: slivers and triangles that bridge open seams are left out, since their shape at rest is not that of the cloth
+//! (`energy::membrane`, `mesh::bridges`). Wrinkles finer than an edge are not resolved, and the negative strain across a fold is not reported. The pressure is that of the penalty at rest; it is smooth over about one
 //! edge.
 
 use glam::DVec3;
@@ -47,7 +47,7 @@ pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiff
     let mut sum = vec![0.0; x.len()];
     let mut area = vec![0.0; x.len()];
     let mut strains: Vec<f64> = Vec::with_capacity(cloth.triangles.len());
-    for triangle in cloth.triangles.iter().filter(|triangle| !triangle.sliver) {
+    for triangle in cloth.triangles.iter().filter(|triangle| triangle.has_strain()) {
         let strain = 100.0 * principal_strain(triangle.deformation(x));
         strains.push(strain);
         for v in triangle.vertices {
@@ -82,8 +82,31 @@ pub(crate) fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
 mod tests {
     use super::*;
     use crate::body::distance::Body;
+    use crate::garment::fabric::Fabric;
     use crate::mesh::TriMesh;
+    use crate::mesh::rest::RestShape;
     use crate::mesh::samples::cuboid;
+    use crate::mesh::topology::Topology;
+
+    #[test]
+    fn triangles_of_a_guessed_rest_shape_are_left_out() {
+        let at = |x: f64, y: f64| DVec3::new(x, y, 0.5);
+        let mesh =
+            TriMesh::new(vec![at(0.0, 0.0), at(0.1, 0.0), at(0.1, 0.1), at(0.0, 0.1)], vec![[0, 1, 2], [0, 2, 3]]);
+        let body = Body::new(&cuboid(DVec3::new(-0.5, -0.5, -1.0), DVec3::new(0.5, 0.5, 0.0))).unwrap();
+        let mut rest = RestShape::from_edges(&mesh).unwrap();
+        rest.corners[0] = rest.corners[0].map(|p| 0.5 * p);
+        let strain = |rest: &RestShape| {
+            let fabric = Fabric::by_name("jersey").unwrap();
+            let cloth = Cloth::new(&mesh, &Topology::new(&mesh), rest, &fabric, &[]).unwrap();
+            let contacts = cloth.contacts(&body, &mesh.positions);
+            let stiffness = contacts.stiffness();
+            fit(&cloth, contacts, &mesh.positions, stiffness).strain_max_percent
+        };
+        assert!((strain(&rest) - 100.0).abs() < 1e-9);
+        rest.guessed = vec![true, false];
+        assert!(strain(&rest).abs() < 1e-9);
+    }
 
     #[test]
     fn strain_and_pressure_of_a_stretched_sheet_on_a_table_are_those_imposed() {

@@ -35,7 +35,7 @@ pub struct Folds {
 pub(crate) fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
     let mut sum = vec![DMat3::ZERO; x.len()];
     let mut area = vec![0.0; x.len()];
-    for triangle in cloth.triangles.iter().filter(|t| !t.sliver) {
+    for triangle in cloth.triangles.iter().filter(|t| t.has_strain()) {
         let (excess, across) = excess(triangle.deformation(x));
         let tensor = outer(across, across) * (excess * triangle.area);
         for v in triangle.vertices.map(|v| v as usize) {

@@ -6,7 +6,8 @@
 //! longer than twice the median are shortened to the median, so that the seam is closed at rest.
 //!
 //! Limits: a strip one triangle wide along the seams is accurate to a few millimetres, and its grain is unknown. Panels less
-//! than two sides apart keep that much excess cloth in the seam.
+//! than two sides apart keep that much excess cloth in the seam. The shape is a guess, so these triangles are left out of the
+//! strains that results report.
 
 use glam::DVec2;
 
@@ -50,13 +51,15 @@ impl Bridges {
         (few && longest_m > BRIDGE_LENGTH.max(BRIDGE_RATIO * usual_m)).then_some(Self { triangles, longest_m, usual_m })
     }
 
-    /// Replaces the shape of the bridging triangles in `rest`, the rest shape from the mesh's own edges.
+    /// Replaces the shape of the bridging triangles in `rest`, the rest shape from the mesh's own edges, and marks it as guessed.
     pub(crate) fn shut(self, rest: &mut RestShape) {
-        for corners in &mut rest.corners {
+        rest.guessed = vec![false; rest.corners.len()];
+        for (corners, guessed) in rest.corners.iter_mut().zip(&mut rest.guessed) {
             let own = sides(corners.map(|p| p.extend(0.0)));
             let long = own.map(|s| s > LONG_RATIO * self.usual_m);
             if let Some(shaped) = long.contains(&true).then(|| self.shaped(own, long)).flatten() {
                 *corners = turned_like(*corners, shaped, long);
+                *guessed = true;
             }
         }
     }
@@ -119,6 +122,7 @@ mod tests {
             assert!(longest < 0.016, "triangle {t}: {longest} m");
             let bridges = sides(own.map(|p| p.extend(0.0))).into_iter().any(|s| s > 0.1);
             assert_eq!(own == now, !bridges, "triangle {t}");
+            assert_eq!(rest.is_guessed(t), bridges, "triangle {t}");
             let [a, b, c] = *now;
             assert!((b - a).perp_dot(c - a) > 0.0, "triangle {t} is turned over");
         }

@@ -256,7 +256,7 @@ fn rest_shape(
         areas.into_iter().fold((0, 0.0), |largest, of| if of.1 > largest.1 { of } else { largest }).0
     };
     let cut_from = if rest.cut_from.is_empty() { Vec::new() } else { over.iter().map(fabric).collect() };
-    Some(RestShape { corners, cut_from })
+    Some(RestShape { cut_from, ..RestShape::new(corners) })
 }
 
 /// The root of a positive symmetric matrix, by Cayley and Hamilton.

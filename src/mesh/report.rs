@@ -47,7 +47,7 @@ pub enum Repair {
     /// Triangles that bridge open seams were given the size of the others at rest.
     #[error(
         "took {triangles} triangles up to {:.0} cm long, where most sides are {:.1} cm, for bridges over open seams, which \
-         are as short as the others at rest (--rest own: as they are)",
+         are as short as the others at rest and left out of strains (--rest own: as they are)",
         1e2 * .longest_m,
         1e2 * .usual_m
     )]

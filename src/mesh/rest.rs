@@ -59,18 +59,25 @@ pub struct RestShape {
     pub corners: Vec<[DVec2; 3]>,
     /// Index of the fabric that each triangle is cut from; empty if all are cut from the first.
     pub cut_from: Vec<u16>,
+    /// Whether the shape of each triangle is a guess (`mesh::bridges`); empty if none is.
+    pub guessed: Vec<bool>,
 }
 
 impl RestShape {
     /// Triangles of these corners (m), all cut from one fabric.
     pub(crate) fn new(corners: Vec<[DVec2; 3]>) -> Self {
-        Self { corners, cut_from: Vec::new() }
+        Self { corners, cut_from: Vec::new(), guessed: Vec::new() }
     }
 
     /// Index of the fabric that a triangle is cut from.
     #[must_use]
     pub fn fabric_of(&self, triangle: usize) -> usize {
         self.cut_from.get(triangle).map_or(0, |&fabric| fabric.into())
+    }
+
+    /// Whether the shape of a triangle is a guess.
+    pub(crate) fn is_guessed(&self, triangle: usize) -> bool {
+        self.guessed.get(triangle).copied().unwrap_or(false)
     }
 
     /// The mesh as it stands, at rest: own edges, warp along gravity.

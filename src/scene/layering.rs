@@ -147,6 +147,10 @@ pub(super) fn join(mesh: &mut TriMesh, rest: &mut RestShape, mut more: TriMesh, 
     }
     mesh.triangle_group.extend(more.triangle_group.iter().map(|g| g + groups));
     mesh.positions.extend(more.positions);
+    if !(rest.guessed.is_empty() && more_rest.guessed.is_empty()) {
+        rest.guessed.resize(mesh.triangles.len(), false);
+        rest.guessed.extend((0..more.triangles.len()).map(|t| more_rest.is_guessed(t)));
+    }
     mesh.triangles.extend(more.triangles.iter().map(|t| t.map(|v| v + n)));
     rest.corners.extend(more_rest.corners);
     n

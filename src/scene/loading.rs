@@ -214,6 +214,7 @@ impl SceneSpec {
         }
         imported.drop_triangles(&flat);
         retain(&mut rest.corners, |t| !flat[t]);
+        retain(&mut rest.guessed, |t| !flat[t]);
         imported.remark_on(&rest);
         Ok(rest)
     }

@@ -218,8 +218,11 @@ impl Scene {
             put_over(&mut garment, &self.mesh_below(k, positions), &self.body)?;
         }
         let first = layer.vertices.start as u32;
-        let cut_from = self.rest.cut_from.get(layer.triangles.clone()).unwrap_or_default().to_vec();
-        let rest = RestShape { corners: self.rest.corners[layer.triangles.clone()].to_vec(), cut_from };
+        let rest = RestShape {
+            corners: self.rest.corners[layer.triangles.clone()].to_vec(),
+            cut_from: self.rest.cut_from.get(layer.triangles.clone()).unwrap_or_default().to_vec(),
+            guessed: self.rest.guessed.get(layer.triangles.clone()).unwrap_or_default().to_vec(),
+        };
         let mut scene = Self::new(self.body_below(k, positions)?, garment, rest);
         scene.held = self.held.iter().filter(|&&v| layer.vertices.contains(&(v as usize))).map(|v| v - first).collect();
         scene.layers[0].name = layer.name;

@@ -11,7 +11,7 @@
 //! | inside the body | vertices, by the exact distance | none |
 //! | skin through cloth | pairs of a garment and a body triangle that cross, exactly | none |
 //! | cloth through cloth | pairs of garment triangles that cross, exactly | none |
-//! | largest strain | principal strain of a triangle, % | `TORN_PERCENT`: more than fabrics bear |
+//! | largest strain | principal strain of a triangle of known rest shape, % | `TORN_PERCENT`: more than fabrics bear |
 //! | area kept | area over the area at rest, the least that passes | `CRUSHED_SHARE`: less is cloth that its bending crushed |
 //! | held edges | largest distance of a held vertex from its placement, mm | digits of an exported file |
 //!
@@ -174,10 +174,14 @@ fn of_surfaces(scene: &Scene, x: &[DVec3]) -> [Finding; 3] {
 }
 
 fn of_strain(cloth: &Cloth, x: &[DVec3]) -> Finding {
-    let strains = cloth.triangles.iter().map(|t| 100.0 * principal_strain(t.deformation(x)));
-    let (t, most) =
-        strains.enumerate().fold((0, f64::NEG_INFINITY), |most, (t, s)| if s > most.1 { (t, s) } else { most });
-    at_most("largest strain", most, "%", TORN_PERCENT, format!("in triangle {}", t + 1))
+    let known = cloth.triangles.iter().enumerate().filter(|(_, triangle)| triangle.has_strain());
+    let strains = known.clone().map(|(t, triangle)| (t, 100.0 * principal_strain(triangle.deformation(x))));
+    let (t, most) = strains.fold((0, 0.0), |most: (usize, f64), (t, s)| if s > most.1 { (t, s) } else { most });
+    let left_out = match cloth.triangles.len() - known.count() {
+        0 => String::new(),
+        count => format!("; {count} left out, slivers or bridges of open seams"),
+    };
+    at_most("largest strain", most, "%", TORN_PERCENT, format!("in triangle {}{left_out}", t + 1))
 }
 
 fn of_area(scene: &Scene, x: &[DVec3]) -> Finding {

@@ -131,7 +131,7 @@ impl Cloth {
             .enumerate()
             .map(|(triangle, (&v, &c))| {
                 let made = Triangle::new(v, c).ok_or(EnergyError::Degenerate { triangle })?;
-                Ok(Triangle { fabric: rest.fabric_of(triangle) as u16, ..made })
+                Ok(Triangle { fabric: rest.fabric_of(triangle) as u16, guessed: rest.is_guessed(triangle), ..made })
             })
             .collect::<Result<Vec<_>, _>>()?;
         let mut areas = vec![0.0; n];

@@ -59,6 +59,8 @@ pub struct Triangle {
     pub gradients: [DVec2; 3],
     /// Whether it is a sliver, whose height is raised.
     pub sliver: bool,
+    /// Whether its rest shape is a guess.
+    pub guessed: bool,
     /// Number of its fabric.
     pub fabric: u16,
 }
@@ -176,6 +178,7 @@ impl Triangle {
             area: 0.5 * double.abs() * share,
             gradients: [gradient(b, c), gradient(c, a), gradient(a, b)],
             sliver,
+            guessed: false,
             fabric: 0,
         })
     }
@@ -184,6 +187,12 @@ impl Triangle {
     #[must_use]
     pub(crate) fn compression_ratio(&self) -> f64 {
         if self.sliver { 0.0 } else { COMPRESSION_RATIO }
+    }
+
+    /// Whether its rest shape is that of the cloth, so that its strain can be reported.
+    #[must_use]
+    pub(crate) fn has_strain(&self) -> bool {
+        !self.sliver && !self.guessed
     }
 
     /// Length of its longest side at rest, m.

@@ -47,7 +47,8 @@ impl State {
         subtract_friction(cloth, &contacts, &mut gradient);
         solve_remaining_reactions(cloth, body, &contacts, x, &mut gradient);
         let residual = gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt();
-        let strains: Vec<f64> = cloth.triangles.iter().map(|t| principal_strain(t.deformation(x))).collect();
+        let known = cloth.triangles.iter().filter(|triangle| triangle.has_strain());
+        let strains: Vec<f64> = known.map(|t| principal_strain(t.deformation(x))).collect();
         let (penetrating_vertices, depth) = contacts.penetration(x);
         Self {
             energy_j,
