@@ -84,9 +84,8 @@ mod tests {
     use crate::body::distance::Body;
     use crate::garment::fabric::Fabric;
     use crate::mesh::TriMesh;
-    use crate::mesh::rest::RestShape;
     use crate::mesh::samples::cuboid;
-    use crate::mesh::topology::Topology;
+    use crate::mesh::{RestShape, Topology};
 
     #[test]
     fn triangles_of_a_guessed_rest_shape_are_left_out() {

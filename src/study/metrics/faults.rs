@@ -1,5 +1,6 @@
 //! Faults of a drape: parts that slid down, openings that are stretched, triangles that bridge open seams.
 
+use std::cell::LazyCell;
 use std::collections::HashMap;
 
 use glam::DVec3;
@@ -11,6 +12,10 @@ use crate::scene::Scene;
 
 /// A top edge that sinks farther than this has slid, mm. A neckline settles by 10 to 20 mm; a smaller limit would report it.
 pub(super) const SANK_MM: f64 = 100.0;
+
+/// Least mean height of a hood's edge above the neck's end of the shoulders, m. A hood falls back without the garment sliding. A heuristic:
+/// a stand-up collar is lower.
+const HOOD_M: f64 = 0.1;
 
 /// Least ratio of worn to cut length of a stretched opening. Heuristic; a smaller ratio names openings that are merely snug.
 const STRETCHED: f64 = 1.1;
@@ -72,7 +77,7 @@ pub(super) fn bridges(garment: &TriMesh) -> Option<String> {
 pub struct SlidPart {
     /// Number of the part, from 1, as in `--hold top:2`.
     pub part: usize,
-    /// Descent of its highest edge since placement, mm; without an edge of its highest tenth.
+    /// Descent since placement, mm: see [`sinking`].
     pub sank_mm: f64,
 }
 
@@ -88,20 +93,33 @@ pub(super) fn begins_above_the_bust(scene: &Scene, parts: &[usize]) -> Option<bo
 }
 
 /// Descent of the highest edge of each connected part from its placement to `positions` (m), mm; without an edge of its highest
-/// tenth.
+/// tenth, with a hood of the cloth between armpits and neck.
 fn tops_sank_mm(scene: &Scene, positions: &[DVec3]) -> Vec<f64> {
     let placed = &scene.garment.positions;
     let (part_of, parts) = scene.topology.components();
     let mut of_part = vec![Vec::new(); parts];
     (0_u32..).zip(&part_of).for_each(|(v, &part)| of_part[part as usize].push(v));
+    let height = |v: &u32| placed[*v as usize].z;
+    let sank_mm = |of: &[u32]| {
+        let sank = of.iter().map(|v| height(v) - positions[*v as usize].z).sum::<f64>();
+        1e3 * sank / of.len().max(1) as f64
+    };
+    // The landmarks take as long as all other measures, and most garments stay up.
+    let landmarks = LazyCell::new(|| Landmarks::of(scene.body.mesh()));
     let sank = |(top, mut all): (Option<Vec<u32>>, Vec<u32>)| {
         let top = top.unwrap_or_else(|| {
-            all.sort_by(|&a, &b| placed[b as usize].z.total_cmp(&placed[a as usize].z));
-            all.truncate(all.len().div_ceil(10));
-            all
+            all.sort_by(|a, b| height(b).total_cmp(&height(a)));
+            all[..all.len().div_ceil(10)].to_vec()
         });
-        let sank = top.iter().map(|&v| placed[v as usize].z - positions[v as usize].z).sum::<f64>();
-        1e3 * sank / top.len().max(1) as f64
+        let of_top = sank_mm(&top);
+        if of_top > SANK_MM
+            && let Landmarks { armpit_z: Some(armpit), shoulder_z: Some(shoulder), .. } = *landmarks
+            && top.iter().map(height).sum::<f64>() / top.len() as f64 > shoulder + HOOD_M
+        {
+            all.retain(|v| (armpit..shoulder).contains(&height(v)));
+            return sank_mm(&all);
+        }
+        of_top
     };
     scene.tops().into_iter().zip(of_part).map(sank).collect()
 }
@@ -121,6 +139,19 @@ pub(super) fn sinking(scene: &Scene, positions: &[DVec3]) -> (f64, Vec<SlidPart>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_hood_that_falls_back_has_not_slid() {
+        let mut scene = crate::SceneSpec::new("form", "pullover-1@2000").load().unwrap().scene;
+        let shoulder = Landmarks::of(scene.body.mesh()).shoulder_z.unwrap();
+        let collar = scene.tops()[0].clone().unwrap();
+        // The neckline stands up as a hood, and lies on the back at rest.
+        let draped = scene.garment.positions.clone();
+        collar.iter().for_each(|&v| scene.garment.positions[v as usize].z = shoulder + 0.2);
+        assert_eq!(sinking(&scene, &draped).1, []);
+        let lower: Vec<DVec3> = draped.iter().map(|p| *p - DVec3::Z * 0.15).collect();
+        assert!((sinking(&scene, &lower).1[0].sank_mm - 150.0).abs() < 1e-6);
+    }
 
     #[test]
     fn a_garment_on_the_shoulders_is_told_from_one_at_the_waist() {
