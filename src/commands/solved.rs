@@ -324,3 +324,28 @@ fn follow(session: &Session, sinks: &SinkArgs, connected: &mut dyn FnMut()) -> a
     }
     Ok(recorder.map(Recorder::finish).transpose()?.unwrap_or_default())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_solve_continues_the_numbers_of_the_first() {
+        let mut recorder = Recorder::open(RecordOptions::default()).unwrap();
+        let mut log = IterationLog::new(Some(&mut recorder));
+        let step = |iteration| Step {
+            iteration,
+            energy: 1.0,
+            residual_over_weight: 0.1,
+            contacts: 0,
+            positions: &[],
+            at_rest: false,
+        };
+        // A rejected trial is reported with the number of the iteration that replaces it.
+        for iteration in [0, 1, 1, 2, 0, 1] {
+            log.add(&step(iteration)).unwrap();
+        }
+        log.add(&Step { at_rest: true, ..step(1) }).unwrap();
+        assert_eq!(log.finish().unwrap(), 5);
+    }
+}
