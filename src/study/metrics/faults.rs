@@ -77,7 +77,7 @@ pub(super) fn bridges(garment: &TriMesh) -> Option<String> {
 pub struct SlidPart {
     /// Number of the part, from 1, as in `--hold top:2`.
     pub part: usize,
-    /// Descent since placement, mm: see [`sinking`].
+    /// Descent since placement, mm: of its highest edge; without one of its highest tenth, with a hood of the cloth between armpits and neck.
     pub sank_mm: f64,
 }
 
