@@ -11,8 +11,8 @@
 //! | p | contact pressure | kPa |
 //!
 //! Limits: slivers and triangles that bridge open seams are left out, since their shape at rest is not that of the cloth
-//! (`energy::membrane`, `mesh::bridges`). Wrinkles finer than an edge are not resolved, and the negative strain across a fold is not reported. The pressure is that of the penalty at rest; it is smooth over about one
-//! edge.
+//! (`energy::membrane`, `mesh::bridges`). Wrinkles finer than an edge are not resolved, and the negative strain across a fold is not
+//! reported. The pressure is that of the penalty at rest; it is smooth over about one edge.
 
 use glam::DVec3;
 

@@ -104,7 +104,7 @@ fn tops_sank_mm(scene: &Scene, positions: &[DVec3]) -> Vec<f64> {
         let sank = of.iter().map(|v| height(v) - positions[*v as usize].z).sum::<f64>();
         1e3 * sank / of.len().max(1) as f64
     };
-    // The landmarks take as long as all other measures, and most garments stay up.
+    // Landmarks cut the body by more than a hundred planes, and most garments stay up.
     let landmarks = LazyCell::new(|| Landmarks::of(scene.body.mesh()));
     let sank = |(top, mut all): (Option<Vec<u32>>, Vec<u32>)| {
         let top = top.unwrap_or_else(|| {
