@@ -139,19 +139,31 @@ impl Landmarks {
         self.armpit_z.or(self.shoulder_z).is_some_and(|armpit| top_z <= armpit - MIN_BELOW_ARMPITS)
     }
 
+    /// Distance from the middle across the body at which the arms begin, m: half the width of the trunk below the armpits.
+    pub(super) fn arms_from(&self) -> Option<f64> {
+        self.armpit_z.and_then(|_| self.trunk.last()).map(|(_, half)| *half)
+    }
+
+    /// Whether a point of the body (m) is of an arm: beside the trunk, or above the armpits beyond where the arms begin.
+    pub(super) fn is_of_arm(&self, p: &DVec3) -> bool {
+        let (Some(armpit), Some(&(lowest, at_crotch))) = (self.armpit_z, self.trunk.first()) else { return false };
+        let aside = (p.truncate() - self.middle).dot(math::unit(self.facing)).abs();
+        let hips = || self.trunk.iter().fold(at_crotch, |w, (_, half)| w.max(*half));
+        let at = |z: f64| self.trunk.get(((z - lowest) / STEP).round() as usize).map(|t| t.1);
+        let half = if p.z >= armpit {
+            self.arms_from()
+        } else if p.z < lowest {
+            None
+        } else {
+            at(p.z)
+        };
+        aside > half.unwrap_or_else(hips) + MIN_BESIDE
+    }
+
     /// The body without its arms, open where they were, for garments that hang between the arms. `None` where no arms were found.
     pub(super) fn without_arms(&self, body: &TriMesh) -> Option<TriMesh> {
         let armpit = self.armpit_z?;
-        let across = math::unit(self.facing);
-        let (lowest, at_crotch) = *self.trunk.first()?;
-        let hips = self.trunk.iter().fold(at_crotch, |w, (_, half)| w.max(*half));
-        let of_arm = |p: &DVec3| {
-            let aside = (p.truncate() - self.middle).dot(across).abs();
-            let trunk = self.trunk.get(((p.z - lowest) / STEP).round() as usize);
-            let half = if p.z < lowest { hips } else { trunk.map_or(hips, |t| t.1) };
-            p.z < armpit && aside > half + MIN_BESIDE
-        };
-        let arm: Vec<bool> = body.positions.iter().map(of_arm).collect();
+        let arm: Vec<bool> = body.positions.iter().map(|p| p.z < armpit && self.is_of_arm(p)).collect();
         let kept = |t: &&[u32; 3]| !t.iter().any(|&v| arm[v as usize]);
         Some(TriMesh::new(body.positions.clone(), body.triangles.iter().filter(kept).copied().collect()))
     }

@@ -8,6 +8,8 @@ mod arap;
 mod arrange;
 mod landmarks;
 mod put_on;
+mod shoulders;
+mod skirt;
 mod tube;
 mod waves;
 

@@ -110,54 +110,103 @@ pub(super) fn hung_around(
     gap: f64,
 ) -> Option<Vec<DVec3>> {
     let hem = other_edge(mesh, top)?;
-    let lengths = [top, &hem[..]].map(|edge| lengths_along(mesh, rest, edge));
-    let [of_top, of_hem] = lengths.each_ref().map(|ends| ends.last().copied().unwrap_or_default());
+    let ends = [top, &hem[..]].map(|edge| lengths_along(mesh, rest, edge));
+    let [of_top, of_hem] = ends.each_ref().map(|ends| ends.last().copied().unwrap_or_default());
     let placed: Vec<DVec3> = top.iter().map(|&v| mesh.positions[v as usize]).collect();
     let (z, hull) = fitting(body, landmarks, of_top, placed.iter().map(|x| x.z).sum::<f64>() / placed.len() as f64)?;
-    let middle = landmarks.middle;
     let outwards = ((of_top - perimeter(&hull)) / TAU).max(gap);
-    let laid = laid(&placed, &lengths[0], &Curve::about(&hull, outwards), middle)?;
+    let laid = laid(&placed, &ends[0], &Curve::about(&hull, outwards), landmarks.middle)?;
+    let laid: Vec<DVec3> = laid.iter().map(|x| x.extend(z)).collect();
     let of_edge = |edge: &[u32], s: f64| edge.iter().map(|&v| (v, DVec3::splat(s))).collect::<Vec<_>>();
     let shares = harmonic(mesh, rest, &[of_edge(top, 0.0), of_edge(&hem, 1.0)].concat())?;
-    let unit = |x: &DVec2| (*x - middle).normalize_or_zero().extend(0.0);
-    let mut directions = harmonic(mesh, rest, &top.iter().copied().zip(laid.iter().map(unit)).collect::<Vec<_>>())?;
-    let mean = hem.iter().map(|&v| directions[v as usize]).sum::<DVec3>() / hem.len() as f64;
-    directions.iter_mut().for_each(|c| *c -= mean);
-    let height_m = 2.0 * rest.areas().iter().sum::<f64>() / (of_top + of_hem);
-    let folds = (of_top / FOLD_WIDTH_M).round().max(1.0);
-    let level = |(height, hull): (f64, Vec<DVec2>)| {
-        let curve = Curve::about(&hull, outwards);
-        let share = ((z - height) / height_m).min(1.0);
-        let waves = Waves::new(folds, curve.length(), of_top + share * (of_hem - of_top));
-        (height, curve, waves)
-    };
-    let levels: Vec<(f64, Curve, Waves)> = hulls_below(body, landmarks, z, hull).into_iter().map(level).collect();
-    let at = |(share, direction): (&DVec3, &DVec3)| {
-        let z = z - height_m * share.x;
-        let below = levels.partition_point(|(height, ..)| *height > z).min(levels.len() - 1);
-        let above = below.saturating_sub(1);
-        let [upper, lower] = [above, below].map(|level| levels[level].0);
-        let between = if upper > lower { ((upper - z) / (upper - lower)).min(1.0) } else { 0.0 };
-        let along = math::atan2(direction.y, direction.x) / TAU;
-        let [upper, lower] = [above, below].map(|level| {
-            let (_, curve, waves) = &levels[level];
-            let (around, out) = waves.at(along);
-            let outwards = math::unit(TAU * around);
-            curve.towards(middle, outwards) + out * outwards
-        });
-        upper.lerp(lower, between).extend(z)
-    };
-    let mut x: Vec<DVec3> = shares.iter().zip(&directions).map(at).collect();
-    top.iter().zip(laid).for_each(|(&v, laid)| x[v as usize] = laid.extend(z));
-    Some(x)
+    let shares: Vec<f64> = shares.iter().map(|s| s.x).collect();
+    Tube { mesh, rest, edges: [top, &hem], lengths: [of_top, of_hem], shares: &shares }
+        .hung_below(&laid, z, body, landmarks, gap)
+}
+
+/// A tube with its upper edge and its hem, their lengths, m, and the share of the way between them at each vertex.
+pub(super) struct Tube<'a> {
+    pub(super) mesh: &'a TriMesh,
+    pub(super) rest: &'a RestShape,
+    pub(super) edges: [&'a [u32]; 2],
+    pub(super) lengths: [f64; 2],
+    pub(super) shares: &'a [f64],
+}
+
+impl Tube<'_> {
+    /// D.
+    fn height_m(&self) -> f64 {
+        2.0 * self.rest.areas().iter().sum::<f64>() / self.lengths.iter().sum::<f64>()
+    }
+
+    /// Height (m) of s = 0 with the top edge, of any s, at `laid` (m).
+    pub(super) fn start_z(&self, laid: &[DVec3]) -> f64 {
+        let of = |(&v, x): (&u32, &DVec3)| x.z + self.height_m() * self.shares[v as usize];
+        self.edges[0].iter().zip(laid).map(of).sum::<f64>() / laid.len() as f64
+    }
+
+    /// Positions (m) of the tube around `body` in folds below its top edge, which lies at `laid` (m), with s = 0 at the height `z` (m); `None` where that edge does not run around
+    /// the trunk once.
+    pub(super) fn hung_below(
+        &self,
+        laid: &[DVec3],
+        z: f64,
+        body: &TriMesh,
+        landmarks: &Landmarks,
+        gap: f64,
+    ) -> Option<Vec<DVec3>> {
+        let Self { mesh, rest, edges: [top, hem], lengths: [of_top, of_hem], shares } = *self;
+        let middle = landmarks.middle;
+        if turns(laid, middle).abs().round() != 1.0 {
+            return None;
+        }
+        let unit = |x: &DVec3| (x.truncate() - middle).normalize_or_zero().extend(0.0);
+        let mut directions = harmonic(mesh, rest, &top.iter().copied().zip(laid.iter().map(unit)).collect::<Vec<_>>())?;
+        let mean = hem.iter().map(|&v| directions[v as usize]).sum::<DVec3>() / hem.len() as f64;
+        directions.iter_mut().for_each(|c| *c -= mean);
+        let height_m = self.height_m();
+        let hull = hull_at(body, landmarks, z)?;
+        let outwards = ((of_top - perimeter(&hull)) / TAU).max(gap);
+        let folds = (of_top / FOLD_WIDTH_M).round().max(1.0);
+        let level = |(height, hull): (f64, Vec<DVec2>)| {
+            let curve = Curve::about(&hull, outwards);
+            let share = ((z - height) / height_m).min(1.0);
+            let waves = Waves::new(folds, curve.length(), of_top + share * (of_hem - of_top));
+            (height, curve, waves)
+        };
+        let levels: Vec<(f64, Curve, Waves)> = hulls_below(body, landmarks, z, hull).into_iter().map(level).collect();
+        let at = |(share, direction): (&f64, &DVec3)| {
+            let z = z - height_m * share;
+            let below = levels.partition_point(|(height, ..)| *height > z).min(levels.len() - 1);
+            let above = below.saturating_sub(1);
+            let [upper, lower] = [above, below].map(|level| levels[level].0);
+            let between = if upper > lower { ((upper - z) / (upper - lower)).min(1.0) } else { 0.0 };
+            let along = math::atan2(direction.y, direction.x) / TAU;
+            let [upper, lower] = [above, below].map(|level| {
+                let (_, curve, waves) = &levels[level];
+                let (around, out) = waves.at(along);
+                let outwards = math::unit(TAU * around);
+                curve.towards(middle, outwards) + out * outwards
+            });
+            upper.lerp(lower, between).extend(z)
+        };
+        let mut x: Vec<DVec3> = shares.iter().zip(&directions).map(at).collect();
+        top.iter().zip(laid).for_each(|(&v, laid)| x[v as usize] = *laid);
+        Some(x)
+    }
 }
 
 /// The edge of a tube that is not `top`; `None` for another garment.
 fn other_edge(mesh: &TriMesh, top: &[u32]) -> Option<Vec<u32>> {
+    let [a, b] = edges_of_tube(mesh)?;
+    if a == top { Some(b) } else { (b == top).then_some(a) }
+}
+
+/// Both edges of a tube; `None` for another mesh.
+pub(super) fn edges_of_tube(mesh: &TriMesh) -> Option<[Vec<u32>; 2]> {
     let topology = Topology::new(mesh);
     let is_tube = mesh.vertex_count() + mesh.triangles.len() == topology.edges.len() && topology.components().1 == 1;
-    let [a, b] = <[Vec<u32>; 2]>::try_from(topology.boundary_loops()).ok().filter(|_| is_tube)?;
-    if a == top { Some(b) } else { (b == top).then_some(a) }
+    topology.boundary_loops().try_into().ok().filter(|_| is_tube)
 }
 
 /// Places (m) along `curve` of a closed edge placed at `placed` (m), with these lengths up to the end of each side, turned so that they move least;
@@ -196,7 +245,7 @@ fn turns(x: &[DVec3], middle: DVec2) -> f64 {
 }
 
 /// Rest length of the closed `edge` up to the end of each of its sides, m.
-fn lengths_along(mesh: &TriMesh, rest: &RestShape, edge: &[u32]) -> Vec<f64> {
+pub(super) fn lengths_along(mesh: &TriMesh, rest: &RestShape, edge: &[u32]) -> Vec<f64> {
     let mut next = vec![None; mesh.vertex_count()];
     for (i, &v) in edge.iter().enumerate() {
         next[v as usize] = Some((edge[(i + 1) % edge.len()], i));
