@@ -136,7 +136,12 @@ impl Landmarks {
 
     /// Whether a garment with its top at this height, m, has no shoulders to hang from.
     pub(super) fn is_below_armpits(&self, top_z: f64) -> bool {
-        self.armpit_z.or(self.shoulder_z).is_some_and(|armpit| top_z <= armpit - MIN_BELOW_ARMPITS)
+        self.below_armpits_z().is_some_and(|z| top_z <= z)
+    }
+
+    /// The greatest height at which a garment hangs below the armpits, m.
+    pub(super) fn below_armpits_z(&self) -> Option<f64> {
+        self.armpit_z.or(self.shoulder_z).map(|armpit| armpit - MIN_BELOW_ARMPITS)
     }
 
     /// Distance from the middle across the body at which the arms begin, m: half the width of the trunk below the armpits.

@@ -133,7 +133,7 @@ pub(crate) fn put_on(
         let start = start(&garment, coarse.as_ref());
         let options = Closing { hold: Hold::Nothing, compression: 1.0, gap, max_steps, converged: CONVERGED };
         let first = armless.as_ref().filter(|_| coarse.is_none());
-        let skirt = skirt_of(&garment, has_shoulders);
+        let skirt = skirt_of(&garment, has_shoulders, &landmarks);
         let (mesh, rest) = skirt.as_ref().map_or((&garment.mesh, &garment.rest), Skirt::upper);
         let (mut x, mut taken) = close(mesh, rest, first.unwrap_or(body), &start, options);
         if let Some(body) = first {
@@ -149,7 +149,7 @@ pub(crate) fn put_on(
     let start = start(&garment, coarse.as_ref());
     let max_steps = if coarse.is_some() { MAX_LAST_STEPS } else { COARSER[0].max_steps };
     let options = Closing { hold: Hold::Nothing, compression: 1.0, gap: LAST_GAP, max_steps, converged: CONVERGED };
-    let skirt = skirt_of(&garment, has_shoulders);
+    let skirt = skirt_of(&garment, has_shoulders, &landmarks);
     let (mesh, rest) = skirt.as_ref().map_or((&garment.mesh, &garment.rest), Skirt::upper);
     let (mut x, mut taken) = close(mesh, rest, body, &start, options);
     if let Some(skirt) = skirt {
@@ -169,8 +169,9 @@ pub(crate) fn put_on(
 }
 
 /// The wide skirt of a pattern with shoulders, which is hung after the cloth above it is closed.
-fn skirt_of(garment: &SewnGarment, has_shoulders: bool) -> Option<Skirt> {
-    if has_shoulders { Skirt::of(&garment.mesh, &garment.rest) } else { None }
+fn skirt_of(garment: &SewnGarment, has_shoulders: bool, landmarks: &Landmarks) -> Option<Skirt> {
+    let highest_z = landmarks.below_armpits_z().filter(|_| has_shoulders)?;
+    Skirt::of(&garment.mesh, &garment.rest, highest_z)
 }
 
 fn start(garment: &SewnGarment, coarse: Option<&(SewnGarment, Vec<DVec3>)>) -> Vec<DVec3> {
@@ -282,7 +283,7 @@ fn start_on_shoulders(
     options: Closing<'_>,
 ) -> (Vec<DVec3>, Vec<u32>, usize) {
     let placed = above_feet(&moved_onto(&mesh.positions, body.mesh(), landmarks), body.mesh());
-    if let Some(skirt) = Skirt::of(mesh, rest) {
+    if let Some(skirt) = landmarks.below_armpits_z().and_then(|z| Skirt::of(mesh, rest, z)) {
         let (upper, upper_rest) = skirt.upper();
         let (x, closing) = close(upper, upper_rest, body, &placed, options);
         let (mut x, fairing) = faired_apart(upper, upper_rest, body, x, options);
