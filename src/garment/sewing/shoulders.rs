@@ -32,16 +32,16 @@ const SHOULDER: Range<f64> = 0.7..0.9;
 /// Heights by which a garment is raised, m. Cloth farther below a shoulder is not on it.
 const RAISED: Range<f64> = 0.0..0.1;
 
-/// Length of a step along the arm, m.
+/// Length of a step along the arm, m. A heuristic: a cuff is 5 to 10 cm long.
 const STEP: f64 = 0.02;
 
-/// g, m.
+/// g, m. A heuristic.
 const GAP: f64 = 0.005;
 
-/// Cloth farther below the armpit's line than this, m, is of the trunk. The widest sleeves are half as deep.
+/// Cloth farther below the armpit's line than this, m, is of the trunk. A heuristic.
 const MAX_BELOW: f64 = 0.25;
 
-/// Length over which the moves begin, m.
+/// Length over which the moves begin, m. A heuristic.
 const FADE: f64 = 0.05;
 
 /// An arm: coordinates along it and perpendicular to it.

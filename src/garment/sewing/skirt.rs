@@ -70,7 +70,7 @@ impl Skirt {
         (top_z <= highest_z).then_some(skirt)
     }
 
-    /// What is below the level set, where that is a tube.
+    /// The part of a garment below the level set; `None` where it is no tube.
     fn below(mesh: &TriMesh, rest: &RestShape, s: &[f64], level: f64, lengths: [f64; 2]) -> Option<Self> {
         let is_below: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|&v| s[v as usize] >= level)).collect();
         let of = |below: bool| {
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(above.len() + skirt.vertices.len(), mesh.vertex_count() + skirt.edges[0].len());
         assert!(
             Skirt::of(&mesh, &RestShape::from_edges(&mesh).unwrap(), 0.9).is_none(),
-            "a cape from higher up is none"
+            "a skirt begins below the given height"
         );
         let mesh = dress(10.0);
         assert!(Skirt::of(&mesh, &RestShape::from_edges(&mesh).unwrap(), 1.1).is_none());

@@ -134,19 +134,20 @@ pub(super) struct Tube<'a> {
 }
 
 impl Tube<'_> {
-    /// D.
+    /// D, m.
     fn height_m(&self) -> f64 {
         2.0 * self.rest.areas().iter().sum::<f64>() / self.lengths.iter().sum::<f64>()
     }
 
-    /// Height (m) of s = 0 with the top edge, of any s, at `laid` (m).
+    /// Height (m) of s = 0 for a top edge at `laid` (m), along which s need not be 0.
     pub(super) fn start_z(&self, laid: &[DVec3]) -> f64 {
-        let of = |(&v, x): (&u32, &DVec3)| x.z + self.height_m() * self.shares[v as usize];
+        let height_m = self.height_m();
+        let of = |(&v, x): (&u32, &DVec3)| x.z + height_m * self.shares[v as usize];
         self.edges[0].iter().zip(laid).map(of).sum::<f64>() / laid.len() as f64
     }
 
-    /// Positions (m) of the tube around `body` in folds below its top edge, which lies at `laid` (m), with s = 0 at the height `z` (m); `None` where that edge does not run around
-    /// the trunk once.
+    /// Positions (m) of the tube around `body` in folds below its top edge, which lies at `laid` (m), with s = 0 at the height `z` (m); `None`
+    /// where that edge does not run around the trunk once.
     pub(super) fn hung_below(
         &self,
         laid: &[DVec3],
